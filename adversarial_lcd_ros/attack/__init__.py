@@ -1,0 +1,1 @@
+"""Perturbing a graph within a query and an edit budget."""

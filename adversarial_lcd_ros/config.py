@@ -1,0 +1,235 @@
+"""
+Every setting of the package: default, range, unit and description, once.
+
+Command line options, ROS parameters, YAML files and the documentation are made from these
+frozen dataclasses. Field metadata holds what a range check and a help text need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, Field, fields
+import math
+from typing import Any, ClassVar, TypeVar
+
+from adversarial_lcd_ros.errors import ConfigError
+
+TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow')
+PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip')
+SURROGATES = ('svm_rbf', 'none')
+MODES = ('query', 'surrogate', 'pass')
+
+ConfigT = TypeVar('ConfigT', bound='Config')
+
+
+def setting(default: Any, help: str, *, low: float | None = None, high: float | None = None,
+            choices: tuple[str, ...] | None = None) -> Any:
+    """Return a dataclass field with what is needed to check and to explain it."""
+    return field(default=default, metadata={'help': help, 'low': low, 'high': high,
+                                            'choices': choices})
+
+
+@dataclass(frozen=True)
+class Config:
+    """Base of all settings: checked on construction."""
+
+    title: ClassVar[str] = ''
+
+    def __post_init__(self) -> None:
+        """Check the type and range of every field."""
+        for entry in fields(self):
+            _check(type(self).__name__, entry, getattr(self, entry.name))
+
+    @classmethod
+    def from_mapping(cls: type[ConfigT], values: Mapping[str, Any]) -> ConfigT:
+        """
+        Return the settings with the given values in place of defaults.
+
+        Raises
+        ------
+        ConfigError
+            A name is unknown, or a value of the wrong type or out of range.
+
+        """
+        known = {entry.name: entry for entry in fields(cls)}
+        unknown = sorted(set(values) - set(known))
+        if unknown:
+            raise ConfigError(f'unknown setting {", ".join(unknown)} for {cls.__name__}; '
+                              f'there are: {", ".join(known)}')
+        return cls(**{name: _widen(known[name], value) for name, value in values.items()})
+
+
+def _widen(entry: Field[Any], value: Any) -> Any:
+    # A whole number is a fine value for a real setting (YAML "1", command line "1").
+    if isinstance(entry.default, float) and type(value) is int:
+        return float(value)
+    return value
+
+
+def _check(owner: str, entry: Field[Any], value: Any) -> None:
+    expected = type(entry.default)
+    if type(value) is not expected:
+        raise ConfigError(f'{owner}.{entry.name} = {value!r}: expected {expected.__name__}, '
+                          f'found {type(value).__name__}')
+    low, high, choices = (entry.metadata[key] for key in ('low', 'high', 'choices'))
+    if choices is not None and value not in choices:
+        raise ConfigError(f'{owner}.{entry.name} = {value!r}: expected one of '
+                          f'{", ".join(choices)}')
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(f'{owner}.{entry.name} = {value}: expected a finite number')
+    if (low is not None and value < low) or (high is not None and value > high):
+        raise ConfigError(f'{owner}.{entry.name} = {value}: expected {low} to '
+                          f'{"any" if high is None else high}')
+
+
+@dataclass(frozen=True)
+class BuilderConfig(Config):
+    """Camera image to multi-tier graph (paper, Fig. 2 a-c)."""
+
+    title: ClassVar[str] = 'graph_builder'
+
+    features: int = setting(
+        300, 'Feature nodes in a graph, the strongest after spreading.', low=8, high=5000)
+    detected_features: int = setting(
+        1500, 'ORB features looked for in a frame; all of them count for the vBoW vector.',
+        low=8, high=20000)
+    fast_threshold: int = setting(
+        10, 'FAST threshold of ORB, grey levels.', low=1, high=100)
+    feature_neighbours: int = setting(
+        6, 'Nearest features that a feature is joined with (k).', low=0, high=50)
+    detector: str = setting(
+        'onnx', 'Where objects come from: the network, or none.', choices=('onnx', 'none'))
+    model: str = setting(
+        '', 'ONNX object model; empty: the one that "adversarial-lcd fetch-model" provisions.')
+    vocabulary: str = setting('', 'Visual vocabulary (npz); empty: the one that ships.')
+    object_score: float = setting(
+        0.4, 'Least confidence of an object.', low=0.0, high=1.0)
+    min_object_area: float = setting(
+        0.002, 'Least area of an object as a fraction of the image.', low=0.0, high=1.0)
+    max_object_area: float = setting(
+        0.8, 'Largest area of an object as a fraction of the image.', low=0.0, high=1.0)
+    border_margin: float = setting(
+        0.02, 'Objects are dropped whose centre is closer to the border than this fraction of '
+        'the width or height.', low=0.0, high=0.5)
+    max_objects: int = setting(20, 'Most object nodes in a graph.', low=0, high=200)
+    threads: int = setting(
+        2, 'Threads of the network; 0: as many as cores.', low=0, high=256)
+
+
+@dataclass(frozen=True)
+class LcdConfig(Config):
+    """Loop closure detector: graphs to decisions (paper, target-LCD)."""
+
+    title: ClassVar[str] = 'lcd'
+
+    target: str = setting('wl', 'How two graphs are compared.', choices=TARGETS)
+    model: str = setting('', 'Trained target (JSON); empty: the one that ships.')
+    candidates: int = setting(
+        8, 'Keyframes that vBoW retrieves for the graph to decide on.', low=1, high=1000)
+    min_gap_s: float = setting(
+        8.0, 'Keyframes younger than this are no candidates, seconds.', low=0.0, high=1e6)
+    map_window: int = setting(
+        1, 'Temporal consistency: a candidate is scored together with this many keyframes '
+        'before and after it.', low=0, high=20)
+    threshold: float = setting(
+        0.5, 'A loop closure is declared from this probability on.', low=0.0, high=1.0)
+    hard_answers: bool = setting(
+        False, 'Answer queries with the decision only, not with the probability.')
+    max_keyframes: int = setting(
+        100_000, 'Most keyframes remembered; further graphs are judged but not stored.',
+        low=1, high=10_000_000)
+
+
+@dataclass(frozen=True)
+class AttackConfig(Config):
+    """The man in the middle (paper, attack-module)."""
+
+    title: ClassVar[str] = 'attacker'
+
+    mode: str = setting(
+        'query', 'query: query-guided; surrogate: train on queries for the first frames, then '
+        'attack with none; pass: forward unchanged.', choices=MODES)
+    perturbation: str = setting(
+        'eigencentrality', 'How candidate flips are chosen.', choices=PERTURBATIONS)
+    surrogate: str = setting(
+        'svm_rbf', 'Model that predicts the attack loss of a perturbed graph.',
+        choices=SURROGATES)
+    ratio: float = setting(
+        3e-4, 'Perturbation ratio r: floor(r n^2) edges may be flipped.', low=0.0, high=1.0)
+    queries_per_edit: int = setting(
+        40, 'Query budget of a graph, for each edit that it allows.', low=0, high=100_000)
+    max_queries: int = setting(
+        100_000, 'Query budget of a graph, whatever its edit budget.', low=0, high=10_000_000)
+    deadline_ms: float = setting(
+        0.0, 'Query-guided: after this time the best graph so far is forwarded, '
+        'milliseconds; 0: no deadline.', low=0.0, high=1e7)
+    training_frames: int = setting(
+        100, 'Surrogate mode: frames at the start of the stream that are queried for training '
+        'and forwarded unchanged.', low=1, high=1_000_000)
+    wl_iterations: int = setting(
+        2, 'Iterations H of the Weisfeiler-Lehman features of Eq. (4)-(6).', low=1, high=10)
+    edits: str = setting(
+        'both', 'Which flips are allowed: add edges, delete edges, or both.',
+        choices=('both', 'add', 'delete'))
+    seed: int = setting(42, 'Seed of every random choice.', low=0, high=2**31 - 1)
+
+
+@dataclass(frozen=True)
+class ReplayConfig(Config):
+    """Replay of a bag."""
+
+    title: ClassVar[str] = 'bag_replay'
+
+    lockstep: bool = setting(
+        False, 'Publish a frame, wait for the decision with the same stamp: nothing is lost.')
+    window: int = setting(
+        1, 'Lockstep: frames that may be under way at once.', low=1, high=8)
+    rate: float = setting(
+        1.0, 'Speed of a replay in real time, as a multiple of the recorded one.',
+        low=1e-3, high=1e3)
+    start_s: float = setting(0.0, 'Seconds of the bag to skip.', low=0.0, high=1e9)
+    duration_s: float = setting(
+        0.0, 'Seconds of the bag to replay; 0: to its end.', low=0.0, high=1e9)
+    stride: int = setting(1, 'Every how many frames one is replayed.', low=1, high=100_000)
+    loop: int = setting(
+        1, 'How often the bag is replayed; stamps go on rising.', low=1, high=1_000_000)
+    clock: bool = setting(True, 'Publish /clock.')
+    timeout_s: float = setting(
+        30.0, 'Wait so long for subscribers at the start, and in lockstep for a decision, '
+        'seconds.', low=0.1, high=1e6)
+
+
+@dataclass(frozen=True)
+class LabelConfig(Config):
+    """Which pairs of frames are a loop, from ground truth only (docs/evaluation.md)."""
+
+    title: ClassVar[str] = 'labels'
+
+    rule: str = setting(
+        'overlap', 'How two views are judged: by view overlap, or by distance and angle.',
+        choices=('overlap', 'distance'))
+    positive_overlap: float = setting(
+        0.6, 'Least view overlap of a loop.', low=0.0, high=1.0)
+    negative_overlap: float = setting(
+        0.1, 'Largest view overlap of two different places; the band between is left out.',
+        low=0.0, high=1.0)
+    positive_distance_m: float = setting(
+        0.5, 'Largest distance of a loop, metres (also under the overlap rule).',
+        low=0.0, high=1e3)
+    positive_angle_deg: float = setting(
+        25.0, 'Largest angle of a loop, degrees (also under the overlap rule).',
+        low=0.0, high=180.0)
+    negative_distance_m: float = setting(
+        2.0, 'Distance rule: two views are different places from this distance on, metres.',
+        low=0.0, high=1e6)
+    negative_angle_deg: float = setting(
+        60.0, 'Distance rule: or from this angle on, degrees.', low=0.0, high=180.0)
+    positive_index: int = setting(
+        2, 'Ground truth by index: largest difference of a loop.', low=0, high=10_000)
+    negative_index: int = setting(
+        10, 'Ground truth by index: least difference of two places.', low=1, high=100_000)
+    min_gap_s: float = setting(
+        8.0, 'A loop joins frames at least this far apart in time, seconds.',
+        low=0.0, high=1e6)
+    focal_length: float = setting(
+        0.82, 'Focal length over the image width (TUM: 525 / 640).', low=0.1, high=10.0)

@@ -1,0 +1,33 @@
+"""Errors that a user can act on: what was found, what was expected, what to do."""
+
+
+class AdversarialLcdError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class ConfigError(AdversarialLcdError):
+    """A setting is unknown, of the wrong type, or out of its range."""
+
+
+class GraphError(AdversarialLcdError):
+    """Arrays that do not form a valid multi-tier graph."""
+
+
+class CodecError(AdversarialLcdError):
+    """A payload that is not what its schema says."""
+
+
+class SequenceError(AdversarialLcdError):
+    """A bag, folder or ground truth that is missing, truncated, empty or out of order."""
+
+
+class ModelError(AdversarialLcdError):
+    """A vocabulary, object model or target model that is missing or of the wrong form."""
+
+
+class BudgetError(AdversarialLcdError):
+    """An attack asked for more queries or edits than it was granted."""
+
+
+class EvaluationError(AdversarialLcdError):
+    """An evaluation that cannot give an honest number: lost frames, no labels, no pairs."""

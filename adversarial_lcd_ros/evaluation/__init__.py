@@ -1,0 +1,1 @@
+"""How much accuracy was lost: labels, protocols, statistics, report."""

@@ -1,0 +1,284 @@
+"""The multi-tier graph of a view, immutable, as a struct of numpy arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+import hashlib
+from typing import Any
+
+from adversarial_lcd_ros.errors import GraphError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+OBJECT_TIER = 0
+FEATURE_TIER = 1
+DESCRIPTOR_BYTES = 32
+
+_NODE_ARRAYS = {
+    'tier': (np.uint8, ()),
+    'label': (np.uint32, ()),
+    'position': (np.float32, (2,)),
+    'size': (np.float32, (2,)),
+    'score': (np.float32, ()),
+    'descriptor': (np.uint8, (DESCRIPTOR_BYTES,)),
+}
+
+
+def _empty(dtype: type, *shape: int) -> Any:
+    return field(default_factory=lambda: np.zeros(shape, dtype))
+
+
+@dataclass(frozen=True, eq=False)
+class MultiTierGraph:
+    """
+    Objects and visual features of one camera frame, and the distances between them.
+
+    Tier 0 holds the semantic objects, the "main anchors" of the paper (Fig. 2c), tier 1 the
+    visual features. Arrays are read-only; ``flip`` returns a new graph. Edges are undirected,
+    stored once with source < target, sorted, without repeats: two graphs with the same edges
+    have the same bytes.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Acquisition time of the frame, nanoseconds.
+    frame_id : str
+        Coordinate frame of the camera.
+    sequence : int
+        Number of the frame since the builder started.
+    width, height : int
+        Size of the image, pixels.
+    tier : uint8, (n,)
+        0 object, 1 feature. Objects come first.
+    label : uint32, (n,)
+        Class of an object, visual word of a feature.
+    position : float32, (n, 2)
+        Centre, pixels.
+    size : float32, (n, 2)
+        Width and height of an object's box; diameter of a feature's patch, twice. Pixels.
+    score : float32, (n,)
+        Confidence of an object, response of a feature.
+    descriptor : uint8, (n, 32)
+        ORB descriptor of a feature; zeros for an object.
+    edge : uint32, (m, 2)
+        Ends of every edge, source < target.
+    edge_length : float32, (m,)
+        Distance between the ends over the image diagonal, 0 to 1.
+    word : uint32, (w,)
+        Words of the vBoW vector, ascending. All features of the frame count, not the nodes only.
+    word_weight : float32, (w,)
+        Their tf-idf weights, L1-normalised.
+
+    """
+
+    stamp_ns: int
+    frame_id: str
+    sequence: int
+    width: int
+    height: int
+    tier: NDArray[np.uint8] = _empty(np.uint8, 0)
+    label: NDArray[np.uint32] = _empty(np.uint32, 0)
+    position: NDArray[np.float32] = _empty(np.float32, 0, 2)
+    size: NDArray[np.float32] = _empty(np.float32, 0, 2)
+    score: NDArray[np.float32] = _empty(np.float32, 0)
+    descriptor: NDArray[np.uint8] = _empty(np.uint8, 0, DESCRIPTOR_BYTES)
+    edge: NDArray[np.uint32] = _empty(np.uint32, 0, 2)
+    edge_length: NDArray[np.float32] = _empty(np.float32, 0)
+    word: NDArray[np.uint32] = _empty(np.uint32, 0)
+    word_weight: NDArray[np.float32] = _empty(np.float32, 0)
+
+    def __post_init__(self) -> None:
+        """Check every count, index and range; freeze the arrays."""
+        count = len(self.tier)
+        for name, (dtype, tail) in _NODE_ARRAYS.items():
+            self._check_array(name, dtype, (count, *tail))
+        edges, words = len(self.edge), len(self.word)
+        self._check_array('edge', np.uint32, (edges, 2))
+        self._check_array('edge_length', np.float32, (edges,))
+        self._check_array('word', np.uint32, (words,))
+        self._check_array('word_weight', np.float32, (words,))
+        self._check_nodes()
+        self._check_edges(count)
+        if words and (np.any(np.diff(self.word.astype(np.int64)) <= 0)
+                      or np.any(self.word_weight < 0)):
+            raise GraphError('vBoW words must ascend without repeats and have weights >= 0')
+
+    def _check_array(self, name: str, dtype: type, shape: tuple[int, ...]) -> None:
+        array = getattr(self, name)
+        if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != shape:
+            found = (f'{array.dtype}{array.shape}' if isinstance(array, np.ndarray)
+                     else type(array).__name__)
+            raise GraphError(f'{name}: expected {np.dtype(dtype)}{shape}, found {found}')
+        if array.dtype.kind == 'f' and not np.isfinite(array).all():
+            raise GraphError(f'{name}: {int((~np.isfinite(array)).sum())} values are not finite')
+        array.flags.writeable = False
+
+    def _check_nodes(self) -> None:
+        if not 0 < self.width < 2**31 or not 0 < self.height < 2**31:
+            raise GraphError(f'image size {self.width} x {self.height}: expected positive pixels')
+        if np.any(self.tier > FEATURE_TIER):
+            raise GraphError(f'tier {int(self.tier.max())}: expected 0 (object) or 1 (feature)')
+        if np.any(np.diff(self.tier.astype(np.int8)) < 0):
+            raise GraphError('objects (tier 0) must come before features (tier 1)')
+
+    def _check_edges(self, count: int) -> None:
+        if not len(self.edge):
+            return
+        source, target = self.edge[:, 0].astype(np.int64), self.edge[:, 1].astype(np.int64)
+        if target.max() >= count or source.max() >= count:
+            raise GraphError(f'edge to node {int(self.edge.max())}: the graph has {count} nodes')
+        if np.any(source >= target):
+            raise GraphError('every edge needs source < target (no self-loops)')
+        if np.any(np.diff(source * count + target) <= 0):
+            raise GraphError('edges must be sorted by source, then target, without repeats')
+        if self.edge_length.min() < 0:
+            raise GraphError(f'edge length {float(self.edge_length.min()):g}: expected >= 0')
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes, n."""
+        return len(self.tier)
+
+    @property
+    def edge_count(self) -> int:
+        """Number of undirected edges, m."""
+        return len(self.edge)
+
+    @property
+    def object_count(self) -> int:
+        """Number of tier-0 nodes; they are nodes 0 .. object_count - 1."""
+        return int(np.searchsorted(self.tier, FEATURE_TIER))
+
+    @property
+    def diagonal(self) -> float:
+        """Image diagonal, pixels: the unit of edge lengths."""
+        return float(np.hypot(self.width, self.height))
+
+    @cached_property
+    def edge_key(self) -> NDArray[np.int64]:
+        """Every edge as source * n + target, ascending, shape (m,)."""
+        key: NDArray[np.int64] = (self.edge[:, 0].astype(np.int64) * self.node_count
+                                  + self.edge[:, 1])
+        return key
+
+    @cached_property
+    def node_digest(self) -> bytes:
+        """Digest of all that edge flips leave alone: the key of caches over nodes."""
+        digest = hashlib.blake2b(digest_size=16)
+        for name in _NODE_ARRAYS:
+            digest.update(getattr(self, name).tobytes())
+        return digest.digest()
+
+    @cached_property
+    def adjacency(self) -> sparse.csr_array:
+        """The symmetric 0/1 adjacency matrix A of Eq. (2), float64, shape (n, n)."""
+        return self._symmetric(np.ones(self.edge_count))
+
+    def weighted_adjacency(self, scale: float = 0.1) -> sparse.csr_array:
+        """
+        Return the symmetric matrix of exp(-length / scale), shape (n, n).
+
+        Parameters
+        ----------
+        scale : float
+            Length (over the diagonal) at which the weight has fallen to 1/e.
+
+        """
+        return self._symmetric(np.exp(-self.edge_length.astype(np.float64) / scale))
+
+    def _symmetric(self, value: NDArray[np.float64]) -> sparse.csr_array:
+        source, target = self.edge[:, 0].astype(np.int64), self.edge[:, 1].astype(np.int64)
+        return sparse.csr_array(
+            (np.r_[value, value], (np.r_[source, target], np.r_[target, source])),
+            shape=(self.node_count, self.node_count))
+
+    def length_between(self, pairs: ArrayLike) -> NDArray[np.float32]:
+        """
+        Return the true geometric length over the diagonal between the ends of pairs.
+
+        Parameters
+        ----------
+        pairs : int, (k, 2)
+            Node indices.
+
+        """
+        ends = np.asarray(pairs, np.int64).reshape(-1, 2)
+        offset = self.position[ends[:, 0]] - self.position[ends[:, 1]]
+        length: NDArray[np.float32] = (np.hypot(offset[:, 0], offset[:, 1])
+                                       / np.float32(self.diagonal)).astype(np.float32)
+        return length
+
+    def has_edges(self, pairs: ArrayLike) -> NDArray[np.bool_]:
+        """Tell for each of the (k, 2) node pairs whether the graph has that edge."""
+        key = self._pair_keys(pairs)
+        place = np.searchsorted(self.edge_key, key)
+        found = np.zeros(len(key), bool)
+        inside = place < self.edge_count
+        found[inside] = self.edge_key[place[inside]] == key[inside]
+        return found
+
+    def _pair_keys(self, pairs: ArrayLike) -> NDArray[np.int64]:
+        ends = np.asarray(pairs, np.int64).reshape(-1, 2)
+        if ends.size and (ends.min() < 0 or ends.max() >= self.node_count):
+            raise GraphError(f'flip of node {int(ends.max())}: the graph has {self.node_count}')
+        if np.any(ends[:, 0] == ends[:, 1]):
+            raise GraphError('flip of a node with itself: self-loops are not edges')
+        key: NDArray[np.int64] = ends.min(1) * self.node_count + ends.max(1)
+        return key
+
+    def flip(self, pairs: ArrayLike) -> MultiTierGraph:
+        """
+        Return a new graph in which every given pair has changed between edge and no edge.
+
+        One flip of an undirected edge is one edit of the budget (paper, Sec. 3.3). An added edge
+        gets its true geometric length.
+
+        Parameters
+        ----------
+        pairs : int, (k, 2)
+            Node indices, in any order, without repeats.
+
+        Raises
+        ------
+        GraphError
+            A pair repeats, joins a node with itself, or names a node that is not there.
+
+        """
+        key = np.sort(self._pair_keys(pairs))
+        if np.any(np.diff(key) == 0):
+            raise GraphError('a pair is flipped twice: each flip must be another pair')
+        keep = ~np.isin(self.edge_key, key, assume_unique=True)
+        added = key[~np.isin(key, self.edge_key, assume_unique=True)]
+        ends = np.stack([added // self.node_count, added % self.node_count], axis=1)
+        merged = np.r_[self.edge_key[keep], added]
+        order = np.argsort(merged, kind='stable')
+        edge = np.concatenate([self.edge[keep], ends.astype(np.uint32)])[order]
+        length = np.r_[self.edge_length[keep], self.length_between(ends)][order]
+        return replace(self, edge=edge, edge_length=length)
+
+    def flips_to(self, other: MultiTierGraph) -> NDArray[np.uint32]:
+        """
+        Return the pairs, shape (k, 2), whose flip turns this graph's edges into the other's.
+
+        Raises
+        ------
+        GraphError
+            The nodes differ: the graphs are not perturbations of each other.
+
+        """
+        if self.node_digest != other.node_digest:
+            raise GraphError('the nodes of the two graphs differ: edge flips cannot relate them')
+        key = np.setxor1d(self.edge_key, other.edge_key, assume_unique=True)
+        return np.stack([key // max(self.node_count, 1), key % max(self.node_count, 1)],
+                        axis=1).astype(np.uint32)
+
+    def __eq__(self, other: object) -> bool:
+        """Tell whether every field is equal, arrays byte by byte."""
+        if not isinstance(other, MultiTierGraph):
+            return NotImplemented
+        return all(np.array_equal(getattr(self, name), getattr(other, name))
+                   for name in self.__dataclass_fields__)
+
+    __hash__ = None  # type: ignore[assignment]

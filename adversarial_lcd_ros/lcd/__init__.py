@@ -1,0 +1,1 @@
+"""Graphs -> loop closures: database, targets, decision."""

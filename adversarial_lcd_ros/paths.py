@@ -1,0 +1,52 @@
+"""Where the files that travel with the package, and those it provisions, are found."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from adversarial_lcd_ros.errors import ModelError
+
+PACKAGE = 'adversarial_lcd_ros'
+_HERE = Path(__file__).resolve().parent
+
+
+def share_path(relative: str) -> Path:
+    """
+    Return a file or folder that is installed under share/adversarial_lcd_ros.
+
+    In a source checkout (also an editable or ``--symlink-install`` one) it is the checkout's
+    own; otherwise that of the installation prefix around this package.
+
+    Raises
+    ------
+    ModelError
+        It is in neither place: the installation is incomplete.
+
+    """
+    checkout = _HERE.parent
+    places = [checkout / relative] if (checkout / 'package.xml').is_file() else []
+    places += [parent / 'share' / PACKAGE / relative for parent in _HERE.parents]
+    for place in places:
+        if place.exists():
+            return place
+    raise ModelError(f'{relative} is not installed: looked around {_HERE}; install the package '
+                     'with "pip install ." or "colcon build"')
+
+
+def model_path(name: str) -> Path:
+    """Return an artefact that ships inside the package (vocabulary, trained targets)."""
+    path = _HERE / 'models' / name
+    if not path.is_file():
+        shipped = ', '.join(sorted(p.name for p in path.parent.glob('*.*'))) or 'none'
+        raise ModelError(f'no shipped model {name!r}; there are: {shipped}')
+    return path
+
+
+def cache_folder() -> Path:
+    """Return the folder of provisioned files; ADVERSARIAL_LCD_CACHE overrides the XDG default."""
+    chosen = os.environ.get('ADVERSARIAL_LCD_CACHE')
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
+    return Path(base) / PACKAGE

@@ -1,0 +1,1 @@
+"""Camera image -> multi-tier graph: features, words, objects."""
