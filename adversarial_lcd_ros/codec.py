@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from adversarial_lcd_ros.errors import CodecError, GraphError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, MultiTierGraph
 from adversarial_lcd_ros.paths import PACKAGE, share_path
-import numpy as np
-from numpy.typing import NDArray
-from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

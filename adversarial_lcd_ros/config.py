@@ -8,7 +8,7 @@ frozen dataclasses. Field metadata holds what a range check and a help text need
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, Field, fields
+from dataclasses import Field, dataclass, field, fields
 import math
 from typing import Any, ClassVar, TypeVar
 

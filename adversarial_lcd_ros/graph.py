@@ -7,10 +7,11 @@ from functools import cached_property
 import hashlib
 from typing import Any
 
-from adversarial_lcd_ros.errors import GraphError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+
+from adversarial_lcd_ros.errors import GraphError
 
 OBJECT_TIER = 0
 FEATURE_TIER = 1
