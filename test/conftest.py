@@ -1,0 +1,18 @@
+"""Fixtures shared by all tests."""
+
+from pathlib import Path
+
+import pytest
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / 'shared' / 'data'
+
+
+@pytest.fixture
+def shared_data():
+    """Return the folder of a real sequence by name; skip, saying so, where it is absent."""
+    def folder(name):
+        path = SHARED_DATA / name
+        if not path.is_dir():
+            pytest.skip(f'{path} is not on this machine')
+        return path
+    return folder
