@@ -159,7 +159,7 @@ def _load(payload: bytes | bytearray | memoryview, name: str) -> Any:
                          f'at most {MAX_PAYLOAD_BYTES} are accepted')
     try:
         # rosbags reports most damage as SerdeError, the rest as whatever broke inside it.
-        message = typestore().deserialize_cdr(bytes(payload), f'{PACKAGE}/msg/{name}')
+        message: Any = typestore().deserialize_cdr(bytes(payload), f'{PACKAGE}/msg/{name}')
     except Exception as error:
         raise CodecError(f'{len(payload)} bytes are no {name}: {error!r}') from error
     if message.schema_version != SCHEMA_VERSION:

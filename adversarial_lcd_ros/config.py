@@ -147,8 +147,8 @@ class AttackConfig(Config):
     title: ClassVar[str] = 'attacker'
 
     mode: str = setting(
-        'query', 'query: query-guided; surrogate: train on queries for the first frames, then '
-        'attack with none; pass: forward unchanged.', choices=MODES)
+        'query', 'query: query-guided; surrogate: no queries, by a surrogate trained beforehand; '
+        'pass: forward unchanged.', choices=MODES)
     perturbation: str = setting(
         'eigencentrality', 'How candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
@@ -163,9 +163,9 @@ class AttackConfig(Config):
     deadline_ms: float = setting(
         0.0, 'Query-guided: after this time the best graph so far is forwarded, '
         'milliseconds; 0: no deadline.', low=0.0, high=1e7)
-    training_frames: int = setting(
-        100, 'Surrogate mode: frames at the start of the stream that are queried for training '
-        'and forwarded unchanged.', low=1, high=1_000_000)
+    surrogate_data: str = setting(
+        '', 'Surrogate mode: queried flips (npz) that the surrogate learns from; empty: those '
+        'that ship.')
     wl_iterations: int = setting(
         2, 'Iterations H of the Weisfeiler-Lehman features of Eq. (4)-(6).', low=1, high=10)
     edits: str = setting(

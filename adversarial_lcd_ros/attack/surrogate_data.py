@@ -1,0 +1,85 @@
+"""Queried flips that train a surrogate for later frames, kept as npz."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.attack.surrogates import Surrogate
+from adversarial_lcd_ros.errors import ModelError
+
+
+@dataclass(frozen=True)
+class SurrogateData:
+    """
+    What an attacker learned by queries on other frames than those it attacks.
+
+    The surrogate is fitted to these rows when it is loaded: nothing but arrays is stored.
+
+    Attributes
+    ----------
+    features : float64, (k, d)
+        WL features of single flips.
+    gain : float64, (k,)
+        Attack loss that each gained.
+    is_loop : bool, (k,)
+        Detector's answer to the clean graph of each.
+    word_score : float64, (f,)
+        Per clean graph: largest vBoW score with an older one.
+    word_loop : bool, (f,)
+        Per clean graph: the detector's answer.
+
+    """
+
+    features: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    is_loop: NDArray[np.bool_]
+    word_score: NDArray[np.float64]
+    word_loop: NDArray[np.bool_]
+
+    def fit(self, make: Callable[[], Surrogate | None]) -> dict[bool, Surrogate]:
+        """Return a surrogate for each answer to the clean graph that the data suffice for."""
+        trained = {}
+        for is_loop in (False, True):
+            rows = self.is_loop == is_loop
+            surrogate = make()
+            if surrogate is not None and surrogate.fit(self.features[rows], self.gain[rows]):
+                trained[is_loop] = surrogate
+        return trained
+
+    def loop_bound(self) -> float:
+        """Return the vBoW score that best tells loops from others on the training graphs."""
+        order = np.argsort(self.word_score)
+        loops = self.word_loop[order].astype(np.float64)
+        total = loops.sum(), len(loops) - loops.sum()
+        if not all(total):
+            raise ModelError('the training graphs of the surrogate were all loops, or none was: '
+                             f'found {int(total[0])} loops among {len(loops)} graphs')
+        missed = np.r_[0, np.cumsum(loops)] / total[0]
+        invented = 1 - np.r_[0, np.cumsum(1 - loops)] / total[1]
+        bounds = np.r_[self.word_score[order], np.inf]
+        return float(bounds[np.argmin(missed + invented)])
+
+    def save(self, path: Path) -> None:
+        """Write the arrays as compressed npz."""
+        np.savez_compressed(path, **{entry.name: getattr(self, entry.name)
+                                     for entry in fields(self)})
+
+    @classmethod
+    def load(cls, path: Path) -> SurrogateData:
+        """Read the arrays; raises ModelError."""
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                data = cls(**{entry.name: arrays[entry.name] for entry in fields(cls)})
+        except (OSError, ValueError, KeyError) as error:
+            raise ModelError(f'{path} holds no surrogate data: {error!r}') from error
+        rows, frames = len(data.features), len(data.word_score)
+        if (data.features.ndim != 2 or data.gain.shape != (rows,)
+                or data.is_loop.shape != (rows,) or data.word_loop.shape != (frames,)
+                or not np.isfinite(data.features).all()):
+            raise ModelError(f'{path}: the arrays of the surrogate data do not belong together')
+        return data

@@ -1,0 +1,105 @@
+"""Scores of a target -> calibrated probability, by logistic regression kept as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from adversarial_lcd_ros.errors import ModelError
+
+FORMAT = 'adversarial_lcd_ros/decision/1'
+
+
+@dataclass(frozen=True)
+class Decision:
+    """
+    A logistic decision on the square roots of a target's scores.
+
+    Attributes
+    ----------
+    target : str
+        Name of the target that the scores come from.
+    channels : tuple of str
+        Names of the scores.
+    weights : tuple of float
+        One for each channel.
+    bias : float
+    card : dict
+        How it was trained: sequences, licences, sizes, figures.
+
+    """
+
+    target: str
+    channels: tuple[str, ...]
+    weights: tuple[float, ...]
+    bias: float
+    card: dict[str, Any] = field(default_factory=dict)
+
+    def logit(self, scores: ArrayLike) -> NDArray[np.float64]:
+        """
+        Return the log odds of a loop closure.
+
+        Parameters
+        ----------
+        scores : float, (..., channels)
+            At least 0.
+
+        Returns
+        -------
+        float, (...)
+
+        """
+        roots = np.sqrt(np.maximum(np.asarray(scores, np.float64), 0))
+        logit: NDArray[np.float64] = self.bias + roots @ np.asarray(self.weights)
+        return logit
+
+    def save(self, path: Path) -> None:
+        """Write the decision and its card as JSON."""
+        text = {'format': FORMAT, 'target': self.target, 'channels': list(self.channels),
+                'weights': list(self.weights), 'bias': self.bias, 'card': self.card}
+        path.write_text(json.dumps(text, indent=2) + '\n', encoding='utf-8')
+
+    @classmethod
+    def load(cls, path: Path, target: str, channels: tuple[str, ...]) -> Decision:
+        """
+        Read a decision and check that it belongs to the target.
+
+        Raises
+        ------
+        ModelError
+            The file is missing, damaged, or trained for another target.
+
+        """
+        try:
+            text = json.loads(path.read_text(encoding='utf-8'))
+            decision = cls(str(text['target']), tuple(text['channels']),
+                           tuple(float(weight) for weight in text['weights']),
+                           float(text['bias']), dict(text.get('card', {})))
+            kind = text['format']
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            raise ModelError(f'{path} is no trained decision: {error!r}; train one with '
+                             '"adversarial-lcd train"') from error
+        if kind != FORMAT:
+            raise ModelError(f'{path} has format {kind!r}: expected {FORMAT!r}')
+        if decision.target != target or decision.channels != channels:
+            raise ModelError(f'{path} was trained for target {decision.target} '
+                             f'{decision.channels}: expected {target} {channels}')
+        if len(decision.weights) != len(channels) or not all(
+                math.isfinite(value) for value in (*decision.weights, decision.bias)):
+            raise ModelError(f'{path}: expected {len(channels)} finite weights and a bias, '
+                             f'found {decision.weights} and {decision.bias}')
+        return decision
+
+
+def probability(logit: float) -> float:
+    """Return 1 / (1 + exp(-logit)) without overflow."""
+    if logit >= 0:
+        return 1 / (1 + math.exp(-logit))
+    odds = math.exp(logit)
+    return odds / (1 + odds)

@@ -1,0 +1,23 @@
+"""Targets by name. A new one is one small file and one line in TARGETS."""
+
+from __future__ import annotations
+
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.lcd.targets.anchored import AnchoredTarget
+from adversarial_lcd_ros.lcd.targets.base import Target
+from adversarial_lcd_ros.lcd.targets.descriptors import DescriptorsTarget
+from adversarial_lcd_ros.lcd.targets.edges import EdgesTarget
+from adversarial_lcd_ros.lcd.targets.vbow import VbowTarget
+from adversarial_lcd_ros.lcd.targets.wl import WlTarget
+
+TARGETS: dict[str, type[Target]] = {
+    target.name: target
+    for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget)
+}
+
+
+def make_target(name: str) -> Target:
+    """Return the target of that name; raises ConfigError."""
+    if name not in TARGETS:
+        raise ConfigError(f'no target {name!r}; there are: {", ".join(TARGETS)}')
+    return TARGETS[name]()

@@ -1,0 +1,22 @@
+"""Visual words without a graph: a control that no edge flip can touch."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.keyframes import bow_score
+from adversarial_lcd_ros.lcd.views import NodeMatch, View
+
+
+class VbowTarget:
+    """The DBoW L1 score that also retrieves the candidates."""
+
+    name: ClassVar[str] = 'vbow'
+    channels: ClassVar[tuple[str, ...]] = ('words',)
+
+    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
+        """Return the DBoW L1 score of a pair."""
+        return np.array([bow_score(query.graph, reference.graph)])
