@@ -15,6 +15,8 @@ TARGETS: dict[str, type[Target]] = {
     for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget)
 }
 
+__all__ = ['TARGETS', 'Target', 'make_target']
+
 
 def make_target(name: str) -> Target:
     """Return the target of that name; raises ConfigError."""

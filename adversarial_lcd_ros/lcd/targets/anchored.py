@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.targets.scores import match_objects
+from adversarial_lcd_ros.lcd.targets.scores import match_objects, share
 from adversarial_lcd_ros.lcd.views import NodeMatch, View
 
 
@@ -23,8 +23,6 @@ class AnchoredTarget:
 
     def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
         """Return the scores (spokes, objects) of a pair."""
-        if not query.objects or not reference.objects:
-            return np.zeros(2)
         rows, columns, cosine = match_objects(query, reference)
         anchor = np.full(query.objects, -1, np.int64)
         anchor[rows] = columns
@@ -35,5 +33,5 @@ class AnchoredTarget:
         mapped = np.stack([anchor[ends[:, 0]], match.partner[ends[:, 1]]], axis=1)
         common = reference.graph.has_edges(mapped)
         spokes = float(match.partner_weight[ends[common, 1]].sum())
-        return np.array([spokes / np.sqrt(query.features * reference.features),
-                         cosine.sum() / np.sqrt(query.objects * reference.objects)])
+        return np.array([share(spokes, query.features, reference.features),
+                         share(cosine.sum(), query.objects, reference.objects)])

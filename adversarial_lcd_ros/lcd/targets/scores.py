@@ -15,6 +15,11 @@ def soft_weight(cosine: NDArray[np.float32]) -> NDArray[np.float32]:
     return weight
 
 
+def share(total: float, a: int, b: int) -> float:
+    """Return a sum over the geometric mean of two counts, 0 where there is nothing to count."""
+    return float(total / np.sqrt(a * b)) if a and b else 0.0
+
+
 def edge_score(query: View, reference: View, match: NodeMatch) -> float:
     """
     Return how many edges recur between matched features, over the mean number of edges.
@@ -46,13 +51,11 @@ def node_score(query: View, reference: View, match: NodeMatch, iteration: int) -
         0: descriptors alone; 1: descriptors mixed with their neighbours' (continuous WL).
 
     """
-    norm = np.sqrt(query.features * reference.features)
-    if not norm:
-        return 0.0
-    if iteration == 0:
-        return float(match.weight.sum() / norm)
-    cosine = np.einsum('ij,ij->i', query.x1[match.query], reference.x1[match.reference])
-    return float(soft_weight(cosine).sum() / norm)
+    weight = match.weight
+    if iteration:
+        weight = soft_weight(
+            np.einsum('ij,ij->i', query.x1[match.query], reference.x1[match.reference]))
+    return share(weight.sum(), query.features, reference.features)
 
 
 def match_objects(query: View, reference: View) -> tuple[NDArray[np.int64], NDArray[np.int64],
@@ -80,7 +83,5 @@ def match_objects(query: View, reference: View) -> tuple[NDArray[np.int64], NDAr
 
 def object_score(query: View, reference: View) -> float:
     """Return the summed cosine of assigned objects, over the geometric mean of their numbers."""
-    norm = np.sqrt(query.objects * reference.objects)
-    if not norm:
-        return 0.0
-    return float(match_objects(query, reference)[2].sum() / norm)
+    cosine = match_objects(query, reference)[2]
+    return share(cosine.sum(), query.objects, reference.objects)

@@ -1,0 +1,203 @@
+"""The detector: scores by hand, retrieval, gap, and queries that leave no trace."""
+
+from dataclasses import replace
+import json
+
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros.codec import LcdQuery
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import ConfigError, ModelError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.keyframes import bow_score, Database
+from adversarial_lcd_ros.lcd.decision import Decision, probability
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.lcd.targets import make_target, TARGETS
+from adversarial_lcd_ros.lcd.views import match_nodes, View
+from graph_factory import flips_of, graphs, make_graph
+
+GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),
+                        *((k, k + 1) for k in range(2, 39))], objects=2)
+
+
+@pytest.fixture
+def model(tmp_path):
+    """Return a function that writes a decision for a target and returns its path."""
+    def write(target='wl'):
+        channels = TARGETS[target].channels
+        path = tmp_path / f'{target}.json'
+        Decision(target, channels, (10.0,) * len(channels), -10.0).save(path)
+        return str(path)
+    return write
+
+
+def scores(target, query, reference):
+    a, b = View(query), View(reference)
+    return dict(zip(TARGETS[target].channels,
+                    make_target(target).compare(a, b, match_nodes(a, b)), strict=True))
+
+
+def test_a_graph_is_most_like_itself():
+    root = np.sqrt(0.6)
+    assert scores('descriptors', GRAPH, GRAPH)['features'] == pytest.approx(root, abs=1e-6)
+    found = scores('wl', GRAPH, GRAPH)
+    assert found['features'] == pytest.approx(root, abs=1e-6)
+    assert found['objects'] == pytest.approx(1, abs=1e-6)
+    assert scores('vbow', GRAPH, GRAPH)['words'] == pytest.approx(1, abs=1e-6)
+
+
+def test_edge_score_counts_edges_between_matched_features():
+    # 37 of 56 edges join two features; objects have no descriptor to match.
+    assert scores('edges', GRAPH, GRAPH)['edges'] == pytest.approx(37 * 0.6 / 56, abs=1e-6)
+    fewer = GRAPH.flip([(2, 3)])
+    assert scores('edges', fewer, GRAPH)['edges'] == pytest.approx(36 * 0.6 / 55.5, abs=1e-6)
+
+
+def test_anchored_counts_spokes_and_not_edges_between_features():
+    clean = scores('anchored', GRAPH, GRAPH)
+    assert clean['spokes'] == pytest.approx(18 * np.sqrt(0.6) / 38, abs=1e-6)
+    assert scores('anchored', GRAPH.flip([(30, 31)]), GRAPH) == pytest.approx(clean)
+    assert scores('anchored', GRAPH.flip([(0, 5)]), GRAPH)['spokes'] < clean['spokes']
+
+
+@pytest.mark.parametrize('target', ['descriptors', 'vbow'])
+@given(st.integers(0, 2**16))
+@settings(max_examples=20)
+def test_controls_are_immune_to_flips(target, seed):
+    flips = flips_of(GRAPH, np.random.default_rng(seed), 20)
+    assert scores(target, GRAPH.flip(flips), GRAPH) == scores(target, GRAPH, GRAPH)
+
+
+@pytest.mark.parametrize('target', list(TARGETS))
+@given(graphs(), graphs())
+@settings(max_examples=30)
+def test_scores_are_finite_and_not_negative(target, query, reference):
+    found = np.array(list(scores(target, query, reference).values()))
+    assert np.isfinite(found).all()
+    assert (found >= 0).all()
+
+
+@pytest.mark.parametrize('target', list(TARGETS))
+def test_empty_graphs_are_like_nothing(target):
+    empty = MultiTierGraph(0, '', 0, 640, 480)
+    assert not any(scores(target, empty, GRAPH).values())
+    assert not any(scores(target, empty, empty).values())
+
+
+@given(graphs(), st.integers(0, 2**16))
+@settings(max_examples=30)
+def test_the_order_of_features_does_not_matter(graph, seed):
+    first = graph.object_count
+    rng = np.random.default_rng(seed)
+    order = np.r_[np.arange(first), first + rng.permutation(graph.node_count - first)]
+    place = np.argsort(order)
+    edge = np.sort(place[graph.edge.astype(int)], axis=1).reshape(-1, 2)
+    rank = np.lexsort((edge[:, 1], edge[:, 0]))
+    shuffled = replace(
+        graph, **{name: getattr(graph, name)[order] for name in
+                  ('tier', 'label', 'position', 'size', 'score', 'descriptor')},
+        edge=edge[rank].astype(np.uint32), edge_length=graph.edge_length[rank])
+    reference = GRAPH
+    for target in TARGETS:
+        assert scores(target, shuffled, reference) == pytest.approx(
+            scores(target, graph, reference), abs=1e-5)
+
+
+@given(st.lists(graphs(min_nodes=1), min_size=1, max_size=6), graphs(min_nodes=1))
+@settings(max_examples=30)
+def test_the_database_scores_like_the_pairwise_score(stored, query):
+    database = Database()
+    for graph in stored:
+        database.add(graph)
+    assert database.scores(query) == pytest.approx([bow_score(query, g) for g in stored], abs=1e-6)
+
+
+def at(seconds, seed=0, sequence=0):
+    return replace(make_graph(40, GRAPH.edge.tolist(), seed=seed),
+                   stamp_ns=round(seconds * 1e9), sequence=sequence)
+
+
+def test_a_revisit_is_a_loop_and_a_new_place_is_not(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=5.0, map_window=0))
+    for second in range(10):
+        assert not detector.detect(at(second, seed=second, sequence=second)).is_loop
+    decision = detector.detect(at(20, seed=3, sequence=20))
+    assert decision.is_loop
+    assert (decision.match_sequence, decision.match_stamp_ns) == (3, 3_000_000_000)
+    assert decision.sequence == 20
+
+
+def test_keyframes_within_the_gap_are_no_candidates(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=5.0))
+    detector.detect(at(0))
+    assert detector.judge(at(4.9)).match_stamp_ns is None
+    assert detector.judge(at(5)).match_stamp_ns == 0
+
+
+def test_a_query_leaves_no_trace(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0))
+    detector.detect(at(0))
+    before = detector.judge(at(5))
+    for number in range(5):
+        answer = detector.answer(LcdQuery(number, at(5).flip([(2, 3), (4, 9)])))
+        assert answer.id == number
+    assert detector.keyframe_count == 1
+    assert detector.detect(at(5)) == before
+
+
+def test_reuse_between_queries_does_not_change_the_answer(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0))
+    fresh = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0))
+    for second in range(4):
+        detector.detect(at(second, seed=second))
+        fresh.detect(at(second, seed=second))
+    detector.judge(at(9))
+    flipped = at(9).flip([(0, 9), (4, 20), (30, 31)])
+    assert detector.judge(flipped) == fresh.judge(flipped)
+
+
+def test_hard_answers_tell_the_decision_only(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, hard_answers=True))
+    detector.detect(at(0))
+    answer = detector.answer(LcdQuery(1, at(5)))
+    assert not answer.is_soft
+    assert answer.probability in (0.0, 1.0)
+
+
+def test_a_full_database_goes_on_judging(model):
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, max_keyframes=1))
+    detector.detect(at(0))
+    detector.detect(at(2, seed=1))
+    assert detector.keyframe_count == 1
+    assert detector.detect(at(5)).is_loop
+
+
+@pytest.mark.parametrize(('text', 'said'), [
+    ('not json', 'no trained decision'),
+    ('{}', 'no trained decision'),
+    (json.dumps({'format': 'x', 'target': 'wl', 'channels': [], 'weights': [], 'bias': 0}),
+     'format'),
+    (json.dumps({'format': 'adversarial_lcd_ros/decision/1', 'target': 'edges',
+                 'channels': ['edges'], 'weights': [1], 'bias': 0}), 'trained for target edges'),
+    (json.dumps({'format': 'adversarial_lcd_ros/decision/1', 'target': 'wl',
+                 'channels': ['edges', 'features', 'objects'], 'weights': [1], 'bias': 0}),
+     '3 finite weights'),
+])
+def test_a_wrong_model_is_refused(tmp_path, text, said):
+    path = tmp_path / 'model.json'
+    path.write_text(text)
+    with pytest.raises(ModelError, match=said):
+        LoopClosureDetector(LcdConfig(model=str(path)))
+
+
+def test_an_unknown_target_is_refused():
+    with pytest.raises(ConfigError, match='wl'):
+        make_target('nonesuch')
+
+
+def test_probability_of_extreme_odds():
+    assert probability(-1000) == 0
+    assert probability(1000) == 1
+    assert probability(0) == 0.5
