@@ -209,10 +209,14 @@ class LabelConfig(Config):
         'overlap', 'How two views are judged: by view overlap, or by distance and angle.',
         choices=('overlap', 'distance'))
     positive_overlap: float = setting(
-        0.6, 'Least view overlap of a loop.', low=0.0, high=1.0)
-    negative_overlap: float = setting(
-        0.1, 'Largest view overlap of two different places; the band between is left out.',
+        0.6, 'Least view overlap of a loop, seen from both sides.', low=0.0, high=1.0)
+    possible_overlap: float = setting(
+        0.4, 'View overlap, seen from both sides, below which a match is wrong, a camera has '
+        'looked elsewhere, and a frame that has no other candidates is at a new place.',
         low=0.0, high=1.0)
+    negative_overlap: float = setting(
+        0.1, 'Pairs whose view overlap is below this from either side are different places; '
+        'the band between is left out.', low=0.0, high=1.0)
     positive_distance_m: float = setting(
         0.5, 'Largest distance of a loop, metres (also under the overlap rule).',
         low=0.0, high=1e3)
@@ -231,5 +235,58 @@ class LabelConfig(Config):
     min_gap_s: float = setting(
         8.0, 'A loop joins frames at least this far apart in time, seconds.',
         low=0.0, high=1e6)
+    pose_tolerance_s: float = setting(
+        0.05, 'Largest offset in time between a frame and its ground truth pose, seconds.',
+        low=0.0, high=1e3)
     focal_length: float = setting(
         0.82, 'Focal length over the image width (TUM: 525 / 640).', low=0.1, high=10.0)
+
+    def __post_init__(self) -> None:
+        """Check the ranges, and that no pair can be a loop and two places at once."""
+        super().__post_init__()
+        ascending = (('negative_overlap', 'possible_overlap'),
+                     ('possible_overlap', 'positive_overlap'),
+                     ('positive_distance_m', 'negative_distance_m'),
+                     ('positive_angle_deg', 'negative_angle_deg'),
+                     ('positive_index', 'negative_index'))
+        for low, high in ascending:
+            if getattr(self, low) >= getattr(self, high):
+                raise ConfigError(f'LabelConfig.{low} = {getattr(self, low)}: expected less than '
+                                  f'{high} = {getattr(self, high)}')
+
+
+@dataclass(frozen=True)
+class GraphBuilderNodeConfig(Config):
+    """What the graph_builder node has beside BuilderConfig."""
+
+    title: ClassVar[str] = 'graph_builder node'
+
+    queue_depth: int = setting(
+        10, 'Camera frames that may wait; older ones give way. 1: always the newest.',
+        low=1, high=1000)
+
+
+@dataclass(frozen=True)
+class AttackerNodeConfig(Config):
+    """What the attacker node has beside AttackConfig."""
+
+    title: ClassVar[str] = 'attacker node'
+
+    query_timeout_s: float = setting(
+        2.0, 'Wait so long for the answer to a query, seconds; then the best graph so far is '
+        'forwarded.', low=1e-3, high=1e4)
+    max_backlog: int = setting(
+        10, 'Once more graphs than this wait, the attack under way ends and the waiting ones '
+        'are forwarded unchanged.', low=1, high=100_000)
+
+
+@dataclass(frozen=True)
+class BagReplayNodeConfig(Config):
+    """What the bag_replay node has beside ReplayConfig."""
+
+    title: ClassVar[str] = 'bag_replay node'
+
+    bag: str = setting('', 'Bag to replay: a rosbag2 folder, or an .mcap or .db3 file.')
+    record: str = setting(
+        '', 'Bag (MCAP) to write the graphs, decisions and attack reports of this replay to; '
+        'empty: none.')
