@@ -2,14 +2,15 @@
 
 from dataclasses import replace
 
-from hypothesis import given, settings, strategies as st
+from graph_factory import graphs, make_graph
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError
-from graph_factory import graphs, make_graph
 
 stamps = st.integers(0, 2**31 - 1).flatmap(
     lambda s: st.integers(0, 10**9 - 1).map(lambda ns: s * 10**9 + ns))

@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 
-from hypothesis import given, strategies as st
+from graph_factory import flips_of, graphs, make_graph
+from hypothesis import given
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import GraphError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from graph_factory import flips_of, graphs, make_graph
 
 
 def test_flip_deletes_an_edge_and_adds_another():

@@ -3,7 +3,9 @@
 from dataclasses import replace
 import json
 
-from hypothesis import given, settings, strategies as st
+from graph_factory import flips_of, graphs, make_graph
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
@@ -11,12 +13,11 @@ from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.keyframes import bow_score, Database
+from adversarial_lcd_ros.keyframes import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.lcd.targets import make_target, TARGETS
-from adversarial_lcd_ros.lcd.views import match_nodes, View
-from graph_factory import flips_of, graphs, make_graph
+from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
+from adversarial_lcd_ros.lcd.views import View, match_nodes
 
 GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),
                         *((k, k + 1) for k in range(2, 39))], objects=2)

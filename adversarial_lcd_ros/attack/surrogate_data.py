@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ class SurrogateData:
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 data = cls(**{entry.name: arrays[entry.name] for entry in fields(cls)})
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, BadZipFile) as error:
             raise ModelError(f'{path} holds no surrogate data: {error!r}') from error
         rows, frames = len(data.features), len(data.word_score)
         if (data.features.ndim != 2 or data.gain.shape != (rows,)
