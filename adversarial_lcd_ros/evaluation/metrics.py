@@ -1,0 +1,274 @@
+"""
+Figures of a detector, and of what an attack took from it.
+
+Every scored frame has one outcome. ``TP``: a loop is there and a right match was declared.
+``FN``: a loop is there and nothing was declared. ``WM``, wrong match: a loop is there but the
+declared match is another place. ``FP``: no loop is there but one was declared. ``TN``: rightly
+silent. A wrong match is a missed loop (it counts among the false negatives) and also a false
+alarm (it counts against precision).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.metrics import average_precision_score, matthews_corrcoef, precision_recall_curve
+
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE
+
+Outcomes = NDArray[np.str_]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Precision and recall at every threshold (descending recall), each (k,)."""
+
+    threshold: NDArray[np.float64]
+    precision: NDArray[np.float64]
+    recall: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """
+    Figures of one run over the scored frames. None: not defined, a class is empty.
+
+    Attributes
+    ----------
+    positives, negatives : int
+        Frames with and without a loop to be found.
+    tp, fn, fp, tn : int
+        Outcomes; fn includes wrong matches.
+    wrong_matches : int
+        Loops that were declared with another place.
+    accuracy : float or None
+        (tp + tn) / (positives + negatives); None without scored frames.
+    balanced_accuracy : float or None
+        Mean of recall and specificity; None if a class is empty.
+    precision : float or None
+        tp / (tp + fp + wrong_matches); None if nothing was declared.
+    recall, specificity : float or None
+        tp / positives, tn / negatives; None without such frames.
+    recall_at_100_precision : float or None
+        Largest recall of a threshold at which no declaration is wrong; 0 if there is none.
+    average_precision : float or None
+        Area under the precision-recall curve as a sum of steps; None without positives.
+    mcc : float or None
+        Matthews correlation coefficient, 0 if all decisions are alike; None if a class is empty.
+    curve : Curve or None
+        Precision over recall; None without positives.
+
+    """
+
+    positives: int
+    negatives: int
+    tp: int
+    fn: int
+    fp: int
+    tn: int
+    wrong_matches: int
+    accuracy: float | None
+    balanced_accuracy: float | None
+    precision: float | None
+    recall: float | None
+    specificity: float | None
+    recall_at_100_precision: float | None
+    average_precision: float | None
+    mcc: float | None
+    curve: Curve | None = field(default=None, repr=False, compare=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all figures but the curve, ready for JSON."""
+        values = asdict(self)
+        del values['curve']
+        return values
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    What changed from one run to another over the same frames.
+
+    Attributes
+    ----------
+    suppressed : int
+        Loops found before and not after (TP to FN or WM).
+    diverted : int
+        Those of them that are now declared with another place (TP to WM).
+    invented : int
+        Loops declared after where there is none (TN to FP).
+    regained, withdrawn : int
+        The opposite of suppressed and of invented: what the attack repaired by accident.
+    accuracy_decline_pp, decline_pp : float or None
+        Accuracy and balanced accuracy before minus after, percentage points; positive: lost.
+
+    """
+
+    suppressed: int
+    diverted: int
+    invented: int
+    regained: int
+    withdrawn: int
+    accuracy_decline_pp: float | None
+    decline_pp: float | None
+
+
+def outcomes(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
+             match_correct: NDArray[np.bool_]) -> Outcomes:
+    """
+    Return the outcome of every frame, shape (n,): TP, FN, WM, FP, TN, or '' if not scored.
+
+    Parameters
+    ----------
+    kind : int8, (n,)
+        +1 a loop is there, -1 there is none, 0 not scored.
+    is_loop : bool, (n,)
+        The detector declared a loop.
+    match_correct : bool, (n,)
+        The match it named, declared or not, is right.
+
+    """
+    _check_lengths(kind=kind, is_loop=is_loop, match_correct=match_correct)
+    positive, negative = kind == POSITIVE, kind == NEGATIVE
+    declared, right = np.asarray(is_loop, bool), np.asarray(match_correct, bool)
+    return np.select(
+        [positive & declared & right, positive & declared, positive,
+         negative & declared, negative],
+        ['TP', 'WM', 'FN', 'FP', 'TN'], '')
+
+
+def right(outcome: Outcomes) -> NDArray[np.bool_]:
+    """Tell which outcomes are right decisions."""
+    return np.isin(outcome, ('TP', 'TN'))
+
+
+def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
+            probability: NDArray[np.float64], match_correct: NDArray[np.bool_]) -> Metrics:
+    """
+    Return the figures of one run; never fails on an empty class.
+
+    Parameters
+    ----------
+    kind, is_loop, match_correct : (n,)
+        As in ``outcomes``.
+    probability : float64, (n,)
+        The detector's, 0 to 1: orders the decisions for the precision-recall curve.
+
+    Raises
+    ------
+    EvaluationError
+        Lengths differ, or a probability is not within 0 to 1.
+
+    """
+    _check_lengths(kind=kind, probability=probability)
+    if not np.all((probability >= 0) & (probability <= 1)):
+        raise EvaluationError('a probability is not within 0 to 1: the detector is broken')
+    outcome = outcomes(kind, is_loop, match_correct)
+    count = {name: int((outcome == name).sum()) for name in ('TP', 'WM', 'FN', 'FP', 'TN')}
+    positives, negatives = int((kind == POSITIVE).sum()), int((kind == NEGATIVE).sum())
+    declared = count['TP'] + count['WM'] + count['FP']
+    recall, specificity = _ratio(count['TP'], positives), _ratio(count['TN'], negatives)
+    both = recall is not None and specificity is not None
+    scored = kind != 0
+    curve = _curve(kind[scored], probability[scored], match_correct[scored])
+    return Metrics(
+        positives=positives, negatives=negatives, tp=count['TP'], fn=count['FN'] + count['WM'],
+        fp=count['FP'], tn=count['TN'], wrong_matches=count['WM'],
+        accuracy=_ratio(count['TP'] + count['TN'], positives + negatives),
+        balanced_accuracy=((recall or 0.0) + (specificity or 0.0)) / 2 if both else None,
+        precision=_ratio(count['TP'], declared), recall=recall, specificity=specificity,
+        recall_at_100_precision=_recall_at_100_precision(curve),
+        average_precision=_average_precision(kind, probability, match_correct),
+        mcc=_mcc(kind, outcome) if both else None, curve=curve)
+
+
+def effect(kind: NDArray[np.int8], before: Outcomes, after: Outcomes) -> Effect:
+    """
+    Return what changed between two runs over the same frames.
+
+    Parameters
+    ----------
+    kind : int8, (n,)
+        As in ``outcomes``.
+    before, after : str, (n,)
+        ``outcomes`` of the two runs.
+
+    """
+    _check_lengths(kind=kind, before=before, after=after)
+    lost = np.where(right(before), 1, 0) - np.where(right(after), 1, 0)
+    by_class = [lost[kind == value] for value in (POSITIVE, NEGATIVE)]
+    scored = np.concatenate(by_class)
+    return Effect(
+        suppressed=int(((before == 'TP') & (after != 'TP')).sum()),
+        diverted=int(((before == 'TP') & (after == 'WM')).sum()),
+        invented=int(((before == 'TN') & (after == 'FP')).sum()),
+        regained=int(((kind == POSITIVE) & (before != 'TP') & (after == 'TP')).sum()),
+        withdrawn=int(((before == 'FP') & (after == 'TN')).sum()),
+        accuracy_decline_pp=100.0 * float(scored.mean()) if len(scored) else None,
+        decline_pp=(50.0 * float(by_class[0].mean() + by_class[1].mean())
+                    if all(map(len, by_class)) else None))
+
+
+def first_closure_latency_s(stamp_ns: NDArray[np.int64], kind: NDArray[np.int8],
+                            outcome: Outcomes) -> float | None:
+    """Return seconds from the first loop to the first found one; None if none was found."""
+    loops, found = np.flatnonzero(kind == POSITIVE), np.flatnonzero(outcome == 'TP')
+    if not len(found):
+        return None
+    return float(stamp_ns[found[0]] - stamp_ns[loops[0]]) * 1e-9
+
+
+def _check_lengths(**arrays: NDArray[Any]) -> None:
+    if len({len(array) for array in arrays.values()}) > 1:
+        found = ', '.join(f'{name} {len(array)}' for name, array in arrays.items())
+        raise EvaluationError(f'one value a frame is expected of each, found {found}')
+
+
+def _ratio(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _curve(kind: NDArray[np.int8], probability: NDArray[np.float64],
+           match_correct: NDArray[np.bool_]) -> Curve | None:
+    # A frame with a wrong match can be no true positive at any threshold: to sklearn it is a
+    # negative. Recall is then of the loops that were matched, and is scaled to all loops.
+    found, share = _findable(kind, match_correct)
+    if share is None:
+        return None
+    if not found.any():  # sklearn warns and answers recall 1
+        threshold = np.unique(probability)
+        return Curve(threshold, np.zeros(len(threshold)), np.zeros(len(threshold)))
+    precision, recall, threshold = precision_recall_curve(found, probability)
+    # sklearn's last point, (1, 0), stands for a threshold at which nothing is declared.
+    return Curve(threshold, precision[:-1], recall[:-1] * share)
+
+
+def _findable(kind: NDArray[np.int8],
+              match_correct: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], float | None]:
+    found: NDArray[np.bool_] = (kind == POSITIVE) & match_correct
+    return found, _ratio(int(found.sum()), int((kind == POSITIVE).sum()))
+
+
+def _recall_at_100_precision(curve: Curve | None) -> float | None:
+    if curve is None:
+        return None
+    return float(curve.recall[curve.precision == 1.0].max(initial=0.0))
+
+
+def _average_precision(kind: NDArray[np.int8], probability: NDArray[np.float64],
+                       match_correct: NDArray[np.bool_]) -> float | None:
+    scored = kind != 0
+    found, share = _findable(kind[scored], match_correct[scored])
+    if not share:
+        return share  # None without positives, 0.0 if none of them is matched rightly
+    return float(average_precision_score(found, probability[scored])) * share
+
+
+def _mcc(kind: NDArray[np.int8], outcome: Outcomes) -> float:
+    scored = kind != 0
+    return float(matthews_corrcoef(kind[scored] == POSITIVE,
+                                   np.isin(outcome[scored], ('TP', 'FP'))))

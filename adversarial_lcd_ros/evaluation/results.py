@@ -1,0 +1,185 @@
+"""The folder of one evaluation: results/<UTC time>/, and ``latest`` beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import datetime, timezone
+from importlib import metadata
+import json
+import math
+import os
+from pathlib import Path
+import platform
+from typing import Any
+
+import cv2
+
+from adversarial_lcd_ros.config import Config
+from adversarial_lcd_ros.errors import EvaluationError
+
+SUMMARY, RECORDS, REPORT = 'summary.json', 'per_query.csv', 'report.html'
+CONFIGURATION, ENVIRONMENT, PICTURES = 'configuration.json', 'environment.json', 'pictures'
+LATEST = 'latest'
+_PARTIAL = '.partial'
+# Distributions by the name that is shown; the first that is installed counts.
+_DISTRIBUTIONS = {
+    'adversarial_lcd_ros': ('adversarial-lcd-ros', 'adversarial_lcd_ros'),
+    'numpy': ('numpy',), 'scipy': ('scipy',), 'scikit-learn': ('scikit-learn',),
+    'onnxruntime': ('onnxruntime', 'onnxruntime-gpu'), 'rosbags': ('rosbags',),
+    'mcap': ('mcap',), 'rclpy': ('ros-jazzy-rclpy', 'rclpy'), 'matplotlib': ('matplotlib',)}
+
+
+class ResultsFolder:
+    """
+    A results folder that looks finished only when it is.
+
+    It is filled as ``<time>.partial`` and renamed by ``finish``, which then lets ``latest``
+    point to it. What was interrupted keeps its name and can be looked at.
+
+    Attributes
+    ----------
+    path : Path
+        Where to write; changes once, in ``finish``.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @classmethod
+    def create(cls, root: Path, now: datetime | None = None) -> ResultsFolder:
+        """
+        Make ``root/<UTC time>.partial``.
+
+        Raises
+        ------
+        EvaluationError
+            The folder cannot be made.
+
+        """
+        time = (now or datetime.now(timezone.utc)).astimezone(timezone.utc)
+        name = time.strftime('%Y-%m-%dT%H-%M-%SZ')
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            return cls(_new_folder(root, name))
+        except OSError as error:
+            raise EvaluationError(f'no results folder can be made in {root}: {error.strerror}; '
+                                  'choose another one') from error
+
+    def write_json(self, name: str, values: Mapping[str, Any]) -> None:
+        """Write a JSON file; what is not a finite number becomes null."""
+        text = json.dumps(_plain(values), indent=2, allow_nan=False)
+        (self.path / name).write_text(text + '\n', encoding='utf-8')
+
+    def write_setup(self, sections: Sequence[Config], command_line: Sequence[str], seed: int,
+                    extra: Mapping[str, Any] | None = None) -> None:
+        """Write what the run was: effective settings, command line, versions, machine."""
+        # Two attacks have two sections of one title: a list keeps both.
+        settings = [{'section': section.title, 'values': asdict(section)}
+                    for section in sections]
+        self.write_json(CONFIGURATION, {
+            'command_line': list(command_line), 'seed': seed, 'settings': settings,
+            **(extra or {})})
+        self.write_json(ENVIRONMENT, environment())
+
+    def finish(self) -> Path:
+        """
+        Give the folder its final name, point ``latest`` to it, and return it.
+
+        Raises
+        ------
+        EvaluationError
+            summary.json, per_query.csv or report.html is missing, or ``latest`` is no link.
+
+        """
+        missing = [name for name in (SUMMARY, RECORDS, REPORT, CONFIGURATION, ENVIRONMENT)
+                   if not (self.path / name).is_file()]
+        if missing:
+            raise EvaluationError(f'{self.path} is not complete: {", ".join(missing)} missing')
+        final = self.path.with_name(self.path.name.removesuffix(_PARTIAL))
+        link, draft = final.parent / LATEST, final.parent / f'.{LATEST}-{final.name}'
+        if link.exists() and not link.is_symlink():
+            raise EvaluationError(f'{link} is in the way: expected a symbolic link or nothing; '
+                                  'move it away')
+        self.path.rename(final)
+        self.path = final
+        draft.symlink_to(final.name)
+        draft.replace(link)  # atomic: "latest" never points to nothing
+        return final
+
+
+def _new_folder(root: Path, name: str) -> Path:
+    # Two runs within a second get two folders.
+    number = 1
+    while True:
+        unique = name if number == 1 else f'{name}-{number}'
+        path = root / (unique + _PARTIAL)
+        if not (root / unique).exists():
+            try:
+                path.mkdir()
+                return path
+            except FileExistsError:
+                pass  # taken by another process: try the next number
+        number += 1
+
+
+def environment() -> dict[str, Any]:
+    """Return versions and machine; null: not installed."""
+    versions = {name: _version(distributions) for name, distributions in _DISTRIBUTIONS.items()}
+    return {'time_utc': datetime.now(timezone.utc).isoformat(timespec='seconds'),
+            'python': platform.python_version(), 'versions': {**versions,
+                                                              'opencv': cv2.__version__},
+            'rmw_implementation': os.environ.get('RMW_IMPLEMENTATION'),
+            'system': platform.platform(), 'machine': platform.machine(),
+            'processor': _processor(), 'cores': os.cpu_count()}
+
+
+def _version(distributions: Sequence[str]) -> str | None:
+    for name in distributions:
+        try:
+            return metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return None
+
+
+def _processor() -> str | None:
+    information = Path('/proc/cpuinfo')
+    if not information.is_file():
+        return platform.processor() or None
+    lines = information.read_text(encoding='utf-8', errors='replace').splitlines()
+    names = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
+    return names[0] if names else None
+
+
+def _plain(value: Any) -> Any:
+    # numpy scalars to Python's, NaN and infinity to None.
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if hasattr(value, 'item') and not isinstance(value, (str, bytes)):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """
+    Read a JSON object of a results folder.
+
+    Raises
+    ------
+    EvaluationError
+        The file is missing or no JSON object.
+
+    """
+    try:
+        values = json.loads(path.read_text(encoding='utf-8'))
+    except (OSError, ValueError) as error:
+        raise EvaluationError(f'{path} cannot be read: {error}') from error
+    if not isinstance(values, dict):
+        raise EvaluationError(f'{path} holds a {type(values).__name__}: expected an object')
+    return values

@@ -1,0 +1,31 @@
+"""Tables for the terminal; printing is the command line's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from adversarial_lcd_ros.evaluation import wording
+
+
+def decline_table(summary: Mapping[str, Any]) -> Table:
+    """Return what each attack took, as in the report."""
+    title = (f'Decline in balanced accuracy on {summary["sequence"]}: {summary["positives"]} '
+             f'frames with a loop, {summary["negatives"]} at a new place')
+    return _table(title, wording.decline_rows(summary))
+
+
+def figure_table(summary: Mapping[str, Any]) -> Table:
+    """Return the detector's figures before and after, as in the report."""
+    return _table(f'The detector on {summary["sequence"]}', wording.figure_rows(summary))
+
+
+def _table(title: str, rows: Sequence[Mapping[str, str]]) -> Table:
+    table = Table(title=title, title_justify='left')
+    for index, heading in enumerate(rows[0] if rows else ()):
+        table.add_column(heading, justify='left' if index == 0 else 'right')
+    for row in rows:
+        table.add_row(*row.values())
+    return table

@@ -1,0 +1,133 @@
+"""The figures of summary.json in words and cells, for the report and the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+UNDEFINED = 'n/a'
+_NARROW_SPACE = '\u202f'  # does not break the line
+_PERTURBATION = {'eigencentrality': 'eigencentrality', 'random_walk': 'random walk',
+                 'shortest_path': 'shortest path', 'random_flip': 'random flips'}
+_SURROGATE = {'svm_rbf': 'SVM-RBF', 'none': 'no surrogate'}
+_MODE = {'query': 'query-guided', 'surrogate': 'surrogate only', 'pass': 'forwarded unchanged'}
+
+Attack = Mapping[str, Any]
+
+
+def attack_title(attack: Attack) -> str:
+    """Return what an attack is, in words."""
+    if attack['mode'] == 'pass':
+        return 'control: forwarded unchanged'
+    perturbation = _PERTURBATION.get(attack['perturbation'],
+                                     attack['perturbation'].replace('_', ' '))
+    surrogate = _SURROGATE.get(attack['surrogate'], attack['surrogate'].replace('_', '-'))
+    return f'{perturbation} + {surrogate}, {_MODE.get(attack["mode"], attack["mode"])}'
+
+
+def percent(value: float | None, digits: int = 1) -> str:
+    """Return a share in percent."""
+    return UNDEFINED if value is None else f'{100 * value:.{digits}f}{_NARROW_SPACE}%'
+
+
+def number(value: float | None, digits: int = 1) -> str:
+    """Return a number with a fixed count of decimals and thousands set apart."""
+    return UNDEFINED if value is None else f'{value:,.{digits}f}'
+
+
+def mean_count(value: float | None) -> str:
+    """Return a mean of counts; decimals only where they say something."""
+    return number(value, 1 if value is None or value < 100 else 0)
+
+
+def points(value: float | None) -> str:
+    """Return percentage points; what rounds to nothing has no sign."""
+    return UNDEFINED if value is None else f'{round(value, 1) + 0.0:.1f}'
+
+
+def interval(bounds: Sequence[float] | None, factor: float = 1.0) -> str:
+    """Return the bounds of an interval."""
+    if bounds is None:
+        return ''
+    return ' to '.join(f'{round(factor * bound, 1) + 0.0:.1f}' for bound in bounds)
+
+
+def strongest(summary: Mapping[str, Any]) -> Attack | None:
+    """Return the attack with the largest decline; None without attacks."""
+    attacks: list[Attack] = summary['attacks']
+    return max(attacks, key=lambda attack: -1e9 if attack['decline_pp'] is None
+               else attack['decline_pp'], default=None)
+
+
+def headline(summary: Mapping[str, Any]) -> str:
+    """Return the main finding in one or two sentences."""
+    attack = strongest(summary)
+    name, clean = summary['sequence'], summary['clean']
+    if attack is None:
+        return (f'Without an attack the detector reaches a balanced accuracy of '
+                f'{percent(clean["balanced_accuracy"])} on {name}.')
+    effort = (f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
+              'flipped in a graph on average')
+    if attack['decline_pp'] is None:
+        kind = 'frames with a loop' if not summary['positives'] else 'frames at a new place'
+        return (f'{name} has no {kind}, so no balanced accuracy can be given. With {effort}, '
+                f'{_changes(summary, attack)}.')
+    bounds = attack['decline_ci95']
+    if bounds is not None and bounds[0] <= 0:
+        return (f'No attack lowered the balanced accuracy on {name} beyond chance. The strongest, '
+                f'{attack_title(attack)}, changed it from {percent(clean["balanced_accuracy"])} '
+                f'to {percent(attack["balanced_accuracy"])}: a decline of '
+                f'{points(attack["decline_pp"])} points (95{_NARROW_SPACE}% interval '
+                f'{interval(bounds)}), with {effort}.')
+    return (f'The attack took {points(attack["decline_pp"])} points off the balanced accuracy of '
+            f'loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
+            f'{percent(attack["balanced_accuracy"])} (95{_NARROW_SPACE}% interval of the decline '
+            f'{interval(bounds)}), with {effort}. {_sentence(_changes(summary, attack))}.')
+
+
+def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
+    found = summary['clean']['tp']
+    silent = summary['clean']['tn']
+    return (f'{attack["suppressed"]} of {found} loops that had been found were lost, and loops '
+            f'were invented in {attack["invented"]} of {silent} frames that had rightly been '
+            'left alone')
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return the decline table, one row an attack: heading to cell."""
+    clean = summary['clean']
+    return [{
+        'attack': attack_title(attack),
+        'ratio r': f'{attack["ratio"]:g}',
+        'edits': mean_count(attack['edits_mean']),
+        'queries': mean_count(attack['queries_mean']),
+        'balanced accuracy': (f'{percent(clean["balanced_accuracy"])} → '
+                              f'{percent(attack["balanced_accuracy"])}'),
+        'decline, points': points(attack['decline_pp']),
+        '95 % interval': interval(attack['decline_ci95']) or UNDEFINED,
+        'suppressed': f'{attack["suppressed"]} of {clean["tp"]}',
+        'invented': f'{attack["invented"]} of {clean["tn"]}',
+        'unattackable': f'{attack["unattackable"]} of {summary["frames"]}',
+    } for attack in summary['attacks']]
+
+
+def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return the figures of the detector, one row a run: heading to cell."""
+    runs = [('before', summary['clean'])]
+    runs += [(attack_title(attack), attack) for attack in summary['attacks']]
+    return [{
+        'run': title,
+        'accuracy': percent(run['accuracy']),
+        'balanced': percent(run['balanced_accuracy']),
+        '95 % interval': interval(run['balanced_accuracy_ci95'], 100.0) or UNDEFINED,
+        'precision': percent(run['precision']),
+        'recall': percent(run['recall']),
+        'recall at 100 % precision': percent(run['recall_at_100_precision']),
+        'average precision': number(run['average_precision'], 3),
+        'MCC': number(run['mcc'], 3),
+        'wrong matches': str(run['wrong_matches']),
+    } for title, run in runs]

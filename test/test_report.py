@@ -1,0 +1,280 @@
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from html.parser import HTMLParser
+import io
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from adversarial_lcd_ros.codec import AttackReport, LoopClosure
+from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation import report, results, tables, wording
+from adversarial_lcd_ros.evaluation.labels import label_frames
+from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
+from adversarial_lcd_ros.evaluation.records import (
+    AttackRun,
+    make_records,
+    read_records,
+    runs_of,
+    write_records,
+)
+from adversarial_lcd_ros.evaluation.summary import GraphStatistics, summarise
+
+COUNT = 60
+ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',
+                                                         mode='surrogate')}
+
+
+@dataclass(frozen=True)
+class Poses:
+    stamp_ns: np.ndarray
+    position: np.ndarray
+    quaternion: np.ndarray
+    frame_id: str = 'place_index'
+
+
+def make_labels():
+    stamp = np.arange(COUNT) * 10**9
+    place = np.r_[np.arange(30), np.arange(30)].astype(float)  # two walks along the same way
+    position = np.stack([place, place * 0, place * 0], axis=1)
+    return label_frames(Poses(stamp, position, np.tile([0, 0, 0, 1.0], (COUNT, 1))), stamp,
+                        (640, 480), LabelConfig(negative_index=5))
+
+
+def decide(loops, matches=None):
+    """The detector sees a loop at the given frames, each with the frame 30 before it."""
+    return [LoopClosure(index * 10**9, 'camera', index, index in loops,
+                        0.9 if index in loops else 0.1,
+                        *((m * 10**9, m) if (m := (matches or {}).get(index, index - 30)) >= 0
+                          else (None, None)), candidates=max(index - 8, 0))
+            for index in range(COUNT)]
+
+
+def report_of(index, **values):
+    return replace(AttackReport(index * 10**9, 'camera', index, 'failure', 'budget spent', 27, 20,
+                                1080, 100, -1.0, -0.5, 0.01), **values)
+
+
+def make_runs():
+    reports = [report_of(index, status='skipped', edit_budget=0, edits=0, queries=0)
+               if index < 6 else report_of(index) for index in range(COUNT)]
+    attacked = decide({20, *range(35, 60)}, {20: 3, 40: 3})
+    return {'eigen': AttackRun(attacked, reports),
+            'walk': AttackRun(decide(range(30, 60)), reports)}
+
+
+@pytest.fixture(scope='module')
+def records():
+    return make_records(make_labels(), decide(range(30, 60)), make_runs())
+
+
+@pytest.fixture
+def summary(records):
+    return summarise('walks', records, ATTACKS, GraphStatistics.of([300] * COUNT, [900] * COUNT),
+                     seed=1)
+
+
+def test_records_hold_outcome_and_effect(records):
+    runs = runs_of(records)
+    assert list(runs) == ['clean', 'eigen', 'walk']
+    clean, eigen = runs['clean'], runs['eigen']
+    assert [record.outcome for record in clean[30:]] == ['TP'] * 30
+    assert clean[20].outcome == 'TN'
+    assert clean[0].kind == 'no_candidate'
+    assert eigen[20].effect == 'invented'
+    assert eigen[31].effect == 'suppressed'
+    assert eigen[40].effect == 'diverted'
+    assert eigen[50].effect == ''
+    assert eigen[3].status == 'skipped'
+    assert clean[3].status is None
+    assert clean[45].match_frame == 15
+    assert clean[3].match_frame is None
+
+
+def test_records_survive_the_file(records, tmp_path):
+    path = tmp_path / 'per_query.csv'
+    write_records(path, records)
+    assert read_records(path) == records
+    text = path.read_text().replace(',0.9,', ',high,', 1)
+    path.write_text(text)
+    with pytest.raises(EvaluationError, match=r"line \d+: probability is 'high'"):
+        read_records(path)
+    path.write_text('a,b\n')
+    with pytest.raises(EvaluationError, match='columns'):
+        read_records(path)
+
+
+@pytest.mark.parametrize('broken', [
+    lambda all_: all_[:-1], lambda all_: all_[:5] + all_[6:], lambda all_: all_ + all_[:1],
+    lambda all_: [all_[1], all_[0], *all_[2:]]])
+def test_lost_or_repeated_messages_give_no_figure(broken):
+    labels, runs = make_labels(), make_runs()
+    with pytest.raises(EvaluationError, match='run it again'):
+        make_records(labels, broken(decide(())), runs)
+    run = AttackRun(runs['walk'].decisions, broken(list(runs['walk'].reports)))
+    with pytest.raises(EvaluationError, match='run it again'):
+        make_records(labels, decide(()), {'walk': run})
+
+
+def test_match_with_a_frame_of_another_run_is_refused():
+    strange = [replace(decision, match_stamp_ns=-5) if index == 50 else decision
+               for index, decision in enumerate(decide(()))]
+    with pytest.raises(EvaluationError, match='no frame of this replay'):
+        make_records(make_labels(), strange, {})
+
+
+def test_summary_has_the_agreed_fields(summary):
+    assert {'sequence', 'frames', 'graphs', 'decisions', 'nodes_mean', 'edges_mean', 'positives',
+            'negatives', 'clean', 'attacks', 'seed'} <= set(summary)
+    assert {'accuracy', 'balanced_accuracy', 'precision', 'recall', 'recall_at_100_precision',
+            'mcc'} <= set(summary['clean'])
+    assert {'perturbation', 'surrogate', 'ratio', 'mode', 'edits_mean', 'queries_mean',
+            'unattackable', 'suppressed', 'invented', 'accuracy', 'decline_pp',
+            'decline_ci95'} <= set(summary['attacks'][0])
+
+
+def test_summary_figures(summary):
+    eigen, walk = summary['attacks']
+    assert (summary['positives'], summary['negatives']) == (30, 22)
+    assert summary['not_scored'] == {'between': 0, 'no_candidate': 8, 'no_ground_truth': 0}
+    assert (eigen['suppressed'], eigen['diverted'], eigen['invented']) == (6, 1, 1)
+    assert eigen['decline_pp'] == pytest.approx(50 * (6 / 30 + 1 / 22))
+    assert eigen['decline_ci95'][0] < eigen['decline_pp'] < eigen['decline_ci95'][1]
+    assert walk['decline_pp'] == 0
+    assert walk['decline_ci95'] == (0, 0)
+    assert eigen['unattackable'] == 6
+    assert eigen['edits_mean'] == pytest.approx(20 * 54 / 60)  # skipped frames count as none
+
+
+def test_summary_refuses_lost_graphs(records):
+    with pytest.raises(EvaluationError, match='59 graphs for 60 frames'):
+        summarise('walks', records, ATTACKS, GraphStatistics.of([1] * 59, [1] * 59), seed=1)
+    with pytest.raises(EvaluationError, match='runs'):
+        summarise('walks', records, {}, GraphStatistics.of([1] * 60, [1] * 60), seed=1)
+
+
+def test_pictures_are_of_the_telling_frames(records):
+    runs = runs_of(records)
+    chosen = choose_records(runs['eigen'], 6)
+    assert len({record.frame for record in chosen}) == 6
+    assert {'suppressed', 'invented', 'diverted'} <= {record.effect for record in chosen}
+    title, caption = describe(chosen[0], runs['clean'][chosen[0].frame])
+    assert title.startswith(f'Frame {chosen[0].frame}: ')
+    assert 'allowed' in caption
+    assert choose_records([], 6) == []
+
+
+class Links(HTMLParser):
+    """Collects whatever a page would load, and its text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.sources, self.text = [], ''
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.sources += [value for name, value in attributes
+                         if name in ('src', 'srcset', 'href', 'action', 'data')]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture
+def folder(tmp_path, records, summary):
+    made = results.ResultsFolder.create(tmp_path / 'results')
+    made.write_setup([LcdConfig(), *ATTACKS.values()], ['adversarial-lcd', '<evaluate>'], 1)
+    made.write_json(results.SUMMARY, summary)
+    write_records(made.path / results.RECORDS, records)
+    pictures = [Picture(f'Frame {n}', 'a & b', np.full((9, 16, 3), n, np.uint8))
+                for n in range(6)]
+    report.write_report(made.path, summary, records, pictures)
+    return made
+
+
+def test_report_needs_nothing_but_itself(folder):
+    text = (folder.path / results.REPORT).read_text(encoding='utf-8')
+    page = Links(text)
+    assert page.sources
+    assert all(source.startswith('data:') for source in page.sources)
+    assert '@import' not in text
+    assert 'url(' not in text
+    assert '<script' not in text
+    assert sum(source.startswith('data:image/jpeg') for source in page.sources) == 6
+    assert 'a & b' in page.text
+    assert '<evaluate>' in page.text
+
+
+def test_report_is_made_anew_from_the_folder(folder):
+    path = folder.finish() / results.REPORT
+    before = path.read_bytes()
+    path.unlink()
+    assert report.report_folder(path.parent) == path
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize('kind', ['positive', 'negative'])
+def test_report_without_a_class(records, folder, kind):
+    rest = [replace(record, kind='between', outcome='', effect='') if record.kind == kind
+            else record for record in records]
+    one_sided = summarise('walks', rest, ATTACKS, GraphStatistics.of([1] * COUNT, [1] * COUNT), 1)
+    assert one_sided['clean']['balanced_accuracy'] is None
+    path = report.write_report(folder.path, one_sided, rest, [])
+    assert 'no balanced accuracy can be given' in Links(path.read_text(encoding='utf-8')).text
+    json.dumps(one_sided, allow_nan=False)
+
+
+def test_report_without_attacks(records, folder):
+    clean = [record for record in records if record.run == 'clean']
+    summary = summarise('walks', clean, {}, GraphStatistics.of([1] * COUNT, [1] * COUNT), 1)
+    assert report.write_report(folder.path, summary, clean, []).is_file()
+
+
+def test_headline_is_careful(summary):
+    assert 'took' in wording.headline(summary)
+    nothing = {**summary, 'attacks': summary['attacks'][1:]}
+    assert wording.headline(nothing).startswith('No attack lowered')
+
+
+def test_terminal_tables(summary):
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(tables.decline_table(summary))
+    console.print(tables.figure_table(summary))
+    assert 'random walk + SVM-RBF, surrogate only' in console.export_text()
+
+
+def test_latest_changes_only_when_the_folder_is_complete(folder, tmp_path):
+    root = tmp_path / 'results'
+    assert folder.path.name.endswith('.partial')
+    assert not (root / 'latest').exists()
+    final = folder.finish()
+    assert (root / 'latest').resolve() == final
+    assert (final / 'summary.json').is_file()
+    unfinished = results.ResultsFolder.create(root)
+    with pytest.raises(EvaluationError, match='not complete'):
+        unfinished.finish()
+    assert (root / 'latest').resolve() == final
+
+
+def test_two_folders_of_one_second(tmp_path):
+    now = datetime(2026, 1, 2, 3, 4, 5, tzinfo=timezone.utc)
+    names = [results.ResultsFolder.create(tmp_path, now).path.name for _ in range(2)]
+    assert names == ['2026-01-02T03-04-05Z.partial', '2026-01-02T03-04-05Z-2.partial']
+
+
+def test_json_has_no_nan(tmp_path):
+    folder = results.ResultsFolder.create(tmp_path)
+    folder.write_json('a.json', {'x': float('nan'), 'y': [np.float32(0.5), np.int64(3)]})
+    assert results.read_json(folder.path / 'a.json') == {'x': None, 'y': [0.5, 3]}
+    with pytest.raises(EvaluationError, match='cannot be read'):
+        results.read_json(folder.path / 'b.json')
+
+
+def test_environment_names_what_figures_depend_on():
+    found = results.environment()
+    assert found['python']
+    assert found['versions']['numpy']
+    assert found['versions']['opencv']
