@@ -92,10 +92,12 @@ class FrameLabels:
 
 @dataclass(frozen=True, eq=False)
 class _Judgement:
-    # Symmetric (n, n) bool: a loop but for time; may be a loop; certainly another place.
+    # Symmetric (n, n) bool: a loop but for time; may be a loop; certainly another place; a
+    # camera that came from one to the other has left in between.
     near: NDArray[np.bool_]
     possible: NDArray[np.bool_]
     far: NDArray[np.bool_]
+    left: NDArray[np.bool_]
 
 
 def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
@@ -134,7 +136,7 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     rows = replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
                    quaternion=trajectory.quaternion[row])
     judgement = _judge(rows, image_size, config)
-    for part in (judgement.near, judgement.possible, judgement.far):
+    for part in (judgement.near, judgement.possible, judgement.far, judgement.left):
         part &= located[:, None] & located[None, :]
     candidates = _candidates(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
@@ -202,15 +204,16 @@ def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -
     if rows.frame_id == PLACE_INDEX:
         apart = np.abs(rows.position[:, :1] - rows.position[:, 0])
         possible = apart < config.negative_index
-        return _Judgement(apart <= config.positive_index, possible, ~possible)
+        return _Judgement(apart <= config.positive_index, possible, ~possible, ~possible)
     near, far = _by_distance(rows, config)
     if config.rule == 'distance':
-        return _Judgement(near, ~far, far)
+        # Within a room a camera is never far by this rule: to leave is to be no longer near.
+        return _Judgement(near, ~far, far, ~near)
     seen = visible_points(rows.position, rows.quaternion, image_size, config.focal_length)
     mutual, either = np.minimum(seen, seen.T), np.maximum(seen, seen.T)
-    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS),
-                      mutual >= config.possible_overlap * GRID_POINTS,
-                      either < config.negative_overlap * GRID_POINTS)
+    possible = mutual >= config.possible_overlap * GRID_POINTS
+    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible,
+                      either < config.negative_overlap * GRID_POINTS, ~possible)
 
 
 def _by_distance(rows: Trajectory,
@@ -236,7 +239,7 @@ def _relation(judgement: _Judgement, candidates: NDArray[np.int64]) -> NDArray[n
     count = len(candidates)
     index = np.arange(count)
     # The newest earlier frame that looked elsewhere: a loop partner must be older than that.
-    elsewhere = np.tril(~judgement.possible, -1)
+    elsewhere = np.tril(judgement.left, -1)
     newest = np.where(elsewhere.any(axis=1), count - 1 - elsewhere[:, ::-1].argmax(axis=1), -1)
     old_enough = index[None, :] < candidates[:, None]
     pairs: NDArray[np.int8] = np.zeros((count, count), np.int8)
