@@ -1,0 +1,173 @@
+"""The node attacker: a man in the middle on the topic that carries the graphs."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+import sys
+from threading import Condition, Thread
+import time
+import traceback
+from typing import Any
+
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt8MultiArray
+
+from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
+from adversarial_lcd_ros.config import AttackConfig, AttackerNodeConfig
+from adversarial_lcd_ros.errors import CodecError, ConfigError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
+from adversarial_lcd_ros.nodes.oracle import TopicOracle
+from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+
+INPUT, OUTPUT = 'graph_clean', 'graph'
+
+
+class AttackerNode(PipelineNode):
+    """
+    Runs an Attacker between two topics; whatever comes in goes out, in the same order.
+
+    The executor's thread only queues graphs and takes answers; a worker attacks and publishes.
+    """
+
+    default_name = 'attacker'
+    configs = (AttackConfig, AttackerNodeConfig)
+    manual = Manual(
+        'man in the middle that perturbs the edges of multi-tier graphs',
+        subscribes=(f'{INPUT} (std_msgs/UInt8MultiArray, MultiTierGraph)',
+                    'answer (std_msgs/UInt8MultiArray, LcdAnswer)'),
+        publishes=(f'{OUTPUT} (std_msgs/UInt8MultiArray, MultiTierGraph): one for each received, '
+                   "with the QoS of the input's publisher",
+                   'query (std_msgs/UInt8MultiArray, LcdQuery)',
+                   'attack_report (std_msgs/UInt8MultiArray, AttackReport): one for each graph',
+                   '/diagnostics (diagnostic_msgs/DiagnosticArray): counts, budgets, latency'))
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        config, self._node_config = self.settings
+        self._refuse_loop()
+        self._attacker = Attacker(config)
+        self._oracle = TopicOracle(self, self.diagnostics, self._node_config.query_timeout_s)
+        self._reports = create_payload_publisher(self, 'attack_report')
+        self._output: Publisher | None = None
+        self._waiting: deque[tuple[bytes, float]] = deque()
+        self._arrived = Condition()
+        self._catching_up = False
+        self._closing = False
+        self.diagnostics.waiting_for = f'a publisher of {self.resolve_topic_name(INPUT)}'
+        self.diagnostics.gauges['waiting graphs'] = lambda: len(self._waiting)
+        self._worker = Thread(target=self._run, name='attack', daemon=True)
+        self._worker.start()
+        self._input = MirroredSubscription(
+            self, UInt8MultiArray, INPUT, self._on_graph, raw=True, prepare=self._open_output)
+
+    def _refuse_loop(self) -> None:
+        topic = self.resolve_topic_name(INPUT)
+        if topic == self.resolve_topic_name(OUTPUT):
+            raise ConfigError(f'{INPUT} and {OUTPUT} both resolve to {topic}: the attacker would '
+                              f'attack its own output; remap one of them')
+
+    def _open_output(self, qos: QoSProfile) -> bool:
+        """Publish as the input is published; take graphs in once someone listens to them."""
+        if self._output is None:
+            self._output = create_payload_publisher(self, OUTPUT, qos)
+            self.diagnostics.waiting_for = f'a subscriber of {self.resolve_topic_name(OUTPUT)}'
+        if not self._output.get_subscription_count():
+            return False
+        self.diagnostics.waiting_for = ''
+        if self.count_publishers(OUTPUT) > 1:
+            self.get_logger().warning(
+                f'{self.resolve_topic_name(OUTPUT)} has another publisher: the detector gets '
+                f'clean graphs too. Remap the builder: -r {OUTPUT}:={INPUT}')
+        return True
+
+    def _on_graph(self, wire: bytes) -> None:
+        self.diagnostics.count('received graphs')
+        with self._arrived:
+            self._waiting.append((wire, time.perf_counter()))
+            if len(self._waiting) > self._node_config.max_backlog:
+                self._catching_up = True
+                self._oracle.interrupt()
+            self._arrived.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._arrived:
+                if not self._waiting and self._catching_up and not self._closing:
+                    self._catching_up = False
+                    self._oracle.interrupt(False)
+                self._arrived.wait_for(lambda: self._waiting or self._closing)
+                if not self._waiting:
+                    return
+                wire, arrival_s = self._waiting.popleft()
+            self._forward(wire, arrival_s)
+
+    def _forward(self, wire: bytes, arrival_s: float) -> None:
+        """Publish what becomes of one message: attacked, or byte for byte as it came."""
+        result, forwarded = None, wire
+        try:
+            result = self._attack(codec.decode_graph(unwrap(wire)))
+            if len(result.flips):
+                forwarded = wrap(codec.encode_graph(result.perturbed))
+        except CodecError as error:
+            # Dropping what it cannot read would give the man in the middle away.
+            self.diagnostics.count('forwarded unread')
+            self.get_logger().warning(f'graph forwarded unread: {error}',
+                                      throttle_duration_sec=5.0)
+        except Exception:
+            # The worker outlives a defect of an attack: graphs must go on flowing.
+            self.diagnostics.count('failed attacks')
+            self.get_logger().error(f'attack failed, graph forwarded unchanged:\n'
+                                    f'{traceback.format_exc()}')
+        assert self._output is not None
+        self._output.publish(forwarded)
+        duration_s = time.perf_counter() - arrival_s
+        self.diagnostics.count('published graphs')
+        self.diagnostics.time(duration_s)
+        if result is not None:
+            self._report(result, duration_s)
+
+    def _attack(self, graph: MultiTierGraph) -> AttackResult:
+        if self._catching_up or self._closing:
+            reason = 'closing' if self._closing else 'backlog'
+            return AttackResult(graph, graph, 'skipped', reason)
+        result = self._attacker.process(graph, self._oracle.ask)
+        if self._catching_up and result.reason == 'no answer':
+            return replace(result, reason='backlog')
+        return result
+
+    def _report(self, result: AttackResult, duration_s: float) -> None:
+        report = result.report(duration_s)
+        self._reports.publish(wrap(codec.encode_attack_report(report)))
+        for name, by in ((f'attacks {report.status}', 1), ('edits spent', report.edits),
+                         ('edits granted', report.edit_budget),
+                         ('queries granted', report.query_budget),
+                         ('skipped for backlog', int(report.reason == 'backlog'))):
+            self.diagnostics.count(name, by)
+
+    def close(self) -> None:
+        """End the attack under way, forward what waits, stop the worker."""
+        with self._arrived:
+            self._closing = True
+            self._oracle.interrupt()
+            self._arrived.notify()
+        self._worker.join()
+
+    def destroy_node(self) -> None:
+        """Stop the worker before its publishers go."""
+        self.close()
+        super().destroy_node()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    return run_node(AttackerNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""Camera messages to pixels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.errors import CodecError
+
+# Encoding to bytes a pixel, and what turns it into BGR.
+_ENCODINGS: dict[str, tuple[int, int | None]] = {
+    'bgr8': (3, None), 'rgb8': (3, cv2.COLOR_RGB2BGR), 'mono8': (1, cv2.COLOR_GRAY2BGR)}
+MAX_PIXELS = 2**27
+
+
+def image_pixels(message: Any) -> NDArray[np.uint8]:
+    """
+    Return the pixels of a sensor_msgs/Image as BGR, uint8, shape (height, width, 3).
+
+    Raises
+    ------
+    CodecError
+        The encoding is not supported, or size, step and data contradict each other.
+
+    """
+    width, height, step = message.width, message.height, message.step
+    if message.encoding not in _ENCODINGS:
+        raise CodecError(f'image encoding {message.encoding!r}: expected one of '
+                            f'{", ".join(_ENCODINGS)}')
+    channels, conversion = _ENCODINGS[message.encoding]
+    if not 0 < width * height <= MAX_PIXELS:
+        raise CodecError(f'image of {width} x {height} pixels: expected 1 to {MAX_PIXELS}')
+    if step < width * channels or len(message.data) < step * height:
+        raise CodecError(
+            f'{message.encoding} image of {width} x {height} pixels with {len(message.data)} '
+            f'bytes in rows of {step}: expected at least {width * channels} a row')
+    rows: NDArray[np.uint8] = np.frombuffer(message.data, np.uint8, step * height)
+    pixels = rows.reshape(height, step)[:, :width * channels].reshape(height, width, channels)
+    if conversion is None:
+        return np.ascontiguousarray(pixels)
+    converted: NDArray[np.uint8] = cv2.cvtColor(np.ascontiguousarray(pixels), conversion)
+    return converted
+
+
+def compressed_pixels(message: Any) -> NDArray[np.uint8]:
+    """
+    Return the pixels of a sensor_msgs/CompressedImage (JPEG, PNG) as BGR, uint8.
+
+    Raises
+    ------
+    CodecError
+        The data are no image that OpenCV reads.
+
+    """
+    data: NDArray[np.uint8] = np.frombuffer(message.data, np.uint8)
+    pixels: NDArray[np.uint8] | None = None
+    if len(data):
+        try:
+            pixels = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        except cv2.error as error:
+            raise CodecError(f'compressed image refused: {error}') from error
+    if pixels is None:
+        raise CodecError(f'{len(data)} bytes of format {message.format!r} are no image: '
+                            'expected JPEG or PNG')
+    return pixels

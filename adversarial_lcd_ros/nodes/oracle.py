@@ -1,0 +1,113 @@
+"""The detector as the attacker sees it: a topic for queries and one for answers."""
+
+from __future__ import annotations
+
+import secrets
+from threading import Condition
+import time
+
+from rclpy.node import Node
+from std_msgs.msg import UInt8MultiArray
+
+from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.attack.oracle import OracleSilentError
+from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery
+from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
+from adversarial_lcd_ros.nodes.endpoints import create_payload_publisher, payload_qos
+from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+
+_LOOK_S = 0.01
+
+
+class TopicOracle:
+    """
+    Asks the detector by topic; one query at a time, from a thread that is not the executor's.
+
+    Two topics cost as much as a service and can be watched and recorded.
+
+    Parameters
+    ----------
+    node : Node
+    diagnostics : Diagnostics
+        Counts queries, answers and silence.
+    timeout_s : float
+        Wait so long for an answer, seconds.
+
+    """
+
+    def __init__(self, node: Node, diagnostics: Diagnostics, timeout_s: float) -> None:
+        self._diagnostics = diagnostics
+        self._timeout_s = timeout_s
+        self._changed = Condition()
+        self._answer: LcdAnswer | None = None
+        self._interrupted = False
+        self._was_silent = False
+        # A random start: attackers that share a detector see each other's answers.
+        self._id = secrets.randbits(62)
+        self._queries = create_payload_publisher(node, 'query')
+        self._answers = node.create_subscription(
+            UInt8MultiArray, 'answer', self._on_answer, payload_qos(), raw=True)
+
+    def ask(self, graph: MultiTierGraph) -> LcdAnswer:
+        """
+        Return the detector's answer to a graph.
+
+        Raises
+        ------
+        OracleSilentError
+            No answer within the timeout, or ``interrupt`` was called.
+
+        """
+        deadline_s = time.monotonic() + self._timeout_s
+        self._await_listener(deadline_s)
+        with self._changed:
+            self._id += 1
+            self._answer = None
+        self._queries.publish(wrap(codec.encode_query(LcdQuery(self._id, graph))))
+        self._diagnostics.count('published queries')
+        with self._changed:
+            self._changed.wait_for(lambda: self._answer is not None or self._interrupted,
+                                   max(0.0, deadline_s - time.monotonic()))
+            if self._answer is not None:
+                self._was_silent = False
+                return self._answer
+            if self._interrupted:
+                raise OracleSilentError('the query was interrupted')
+        raise self._silence('no answer to a query')
+
+    def interrupt(self, interrupted: bool = True) -> None:
+        """Make the query under way and all later ones fail, or allow them again."""
+        with self._changed:
+            self._interrupted = interrupted
+            self._changed.notify_all()
+
+    def _await_listener(self, deadline_s: float) -> None:
+        # Discovery may still be under way at the first query; once the detector was silent, a
+        # topic without a listener is not waited for again.
+        with self._changed:
+            while not self._queries.get_subscription_count():
+                if self._interrupted:
+                    raise OracleSilentError('the query was interrupted')
+                if self._was_silent or time.monotonic() >= deadline_s:
+                    raise self._silence('nobody listens to queries')
+                self._changed.wait(_LOOK_S)
+
+    def _silence(self, what: str) -> OracleSilentError:
+        self._was_silent = True
+        self._diagnostics.count('queries without answer')
+        return OracleSilentError(f'{what} within {self._timeout_s:g} s: is lcd running, and are '
+                                 'query and answer remapped alike on both sides?')
+
+    def _on_answer(self, wire: bytes) -> None:
+        try:
+            answer = codec.decode_answer(unwrap(wire))
+        except CodecError as error:
+            self._diagnostics.refuse('answer', error)
+            return
+        with self._changed:
+            if answer.id == self._id and self._answer is None:
+                self._answer = answer
+                self._changed.notify_all()
+                self._diagnostics.count('received answers')

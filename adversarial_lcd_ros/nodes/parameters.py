@@ -1,0 +1,95 @@
+"""ROS parameters made from the settings of config.py: same names, defaults, ranges and texts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import Field, fields
+import sys
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from adversarial_lcd_ros.config import Config
+from adversarial_lcd_ros.errors import ConfigError
+
+# Declared by rclpy itself, on every node.
+_RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service')
+_MAX_INTEGER = 2**63 - 1
+
+
+def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:
+    """
+    Declare every setting of the given classes as a parameter, and return the settings.
+
+    The parameters are read-only: the core is made from them once. A whole number is taken for
+    a real parameter (``-p ratio:=1``), which rclpy alone would refuse.
+
+    Parameters
+    ----------
+    node : Node
+        Made with ``automatically_declare_parameters_from_overrides``.
+    configs : sequence of Config classes
+        Without a name in common.
+
+    Raises
+    ------
+    ConfigError
+        An override is unknown, of the wrong type or out of range.
+
+    """
+    given = {name: value for name, value in node.get_parameters_by_prefix('').items()
+             if name not in _RCLPY_PARAMETERS}
+    given = {name: getattr(value, 'value', value) for name, value in given.items()}
+    known = {entry.name for config in configs for entry in fields(config)}
+    unknown = sorted(set(given) - known)
+    if unknown:
+        raise ConfigError(f'unknown parameter {", ".join(unknown)} for {node.get_name()}; '
+                          f'there are: {", ".join(sorted(known))}')
+    settings = []
+    for config in configs:
+        names = {entry.name for entry in fields(config)}
+        setting = config.from_mapping({k: v for k, v in given.items() if k in names})
+        settings.append(setting)
+        for entry in fields(config):
+            if node.has_parameter(entry.name):
+                node.undeclare_parameter(entry.name)
+            node.declare_parameter(entry.name, getattr(setting, entry.name), _descriptor(entry),
+                                   ignore_override=True)
+    return settings
+
+
+def _descriptor(entry: Field[Any]) -> ParameterDescriptor:
+    choices = entry.metadata['choices']
+    descriptor = ParameterDescriptor(
+        description=entry.metadata['help'], read_only=True,
+        additional_constraints=f'one of {", ".join(choices)}' if choices else '')
+    low, high = entry.metadata['low'], entry.metadata['high']
+    if low is None and high is None:
+        return descriptor
+    if isinstance(entry.default, float):
+        descriptor.floating_point_range = [FloatingPointRange(
+            from_value=float(-sys.float_info.max if low is None else low),
+            to_value=float(sys.float_info.max if high is None else high))]
+    else:
+        descriptor.integer_range = [IntegerRange(
+            from_value=int(-_MAX_INTEGER if low is None else low),
+            to_value=int(_MAX_INTEGER if high is None else high), step=1)]
+    return descriptor
+
+
+def describe(configs: Sequence[type[Config]]) -> Iterator[str]:
+    """Yield one line of help for each parameter."""
+    for config in configs:
+        for entry in fields(config):
+            kind = f'{type(entry.default).__name__}, {entry.default!r}{_limits(entry)}'
+            yield f'  {entry.name} ({kind}): {entry.metadata["help"]}'
+
+
+def _limits(entry: Field[Any]) -> str:
+    if entry.metadata['choices']:
+        return f', one of {", ".join(entry.metadata["choices"])}'
+    low, high = entry.metadata['low'], entry.metadata['high']
+    if low is None and high is None:
+        return ''
+    return f', {"any" if low is None else low} to {"any" if high is None else high}'

@@ -1,0 +1,43 @@
+"""Payloads in and out of std_msgs/UInt8MultiArray, as the bytes that go over the wire."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from adversarial_lcd_ros.codec import MAX_PAYLOAD_BYTES, typestore
+from adversarial_lcd_ros.errors import CodecError
+
+WIRE_TYPE = 'std_msgs/msg/UInt8MultiArray'
+
+
+def wrap(payload: bytes) -> bytes:
+    """Return the CDR of a UInt8MultiArray that carries a payload; publish it as it is."""
+    types = typestore().types
+    layout = types['std_msgs/msg/MultiArrayLayout'](dim=[], data_offset=0)
+    data = np.frombuffer(payload, np.uint8)
+    return bytes(typestore().serialize_cdr(types[WIRE_TYPE](layout=layout, data=data), WIRE_TYPE))
+
+
+def unwrap(wire: bytes) -> bytes:
+    """
+    Return the payload that the CDR of a UInt8MultiArray carries.
+
+    Subscriptions take these messages raw: a message broken on the outside as well is seen,
+    counted and, by the attacker, forwarded, where rclpy would lose it without a word.
+
+    Raises
+    ------
+    CodecError
+        The bytes are no such message, or an unreasonably large one.
+
+    """
+    if len(wire) > MAX_PAYLOAD_BYTES:
+        raise CodecError(f'message of {len(wire)} bytes: at most {MAX_PAYLOAD_BYTES} are accepted')
+    try:
+        message: Any = typestore().deserialize_cdr(wire, WIRE_TYPE)
+    except Exception as error:
+        # rosbags reports most damage as SerdeError, the rest as whatever broke inside it.
+        raise CodecError(f'{len(wire)} bytes are no {WIRE_TYPE}: {error!r}') from error
+    return bytes(message.data)

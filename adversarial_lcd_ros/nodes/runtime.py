@@ -1,0 +1,172 @@
+"""Start, life and end of a node process; what all nodes have in common."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import signal
+import sys
+from threading import Event
+from typing import Any, ClassVar
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException, InvalidTopicNameException
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from adversarial_lcd_ros.config import Config
+from adversarial_lcd_ros.errors import AdversarialLcdError, ConfigError
+from adversarial_lcd_ros.nodes import parameters
+from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
+
+EXIT_OK, EXIT_ERROR, EXIT_USAGE = 0, 1, 2
+_SPIN_S = 0.1
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_BAD_ARGUMENTS = (
+    rclpy_implementation.RCLError, rclpy_implementation.RCLInvalidROSArgsError,
+    rclpy_implementation.UnknownROSArgsError, InvalidNamespaceException,
+    InvalidTopicNameException)
+
+
+@dataclass(frozen=True)
+class Manual:
+    """What ``--help`` prints of a node: its purpose, and a line for each topic."""
+
+    purpose: str
+    subscribes: tuple[str, ...] = ()
+    publishes: tuple[str, ...] = ()
+
+
+class PipelineNode(Node):  # type: ignore[misc]
+    """
+    A node whose parameters are settings of config.py, with counts on /diagnostics.
+
+    Parameters
+    ----------
+    options
+        Of ``rclpy.node.Node``: context, parameter_overrides, use_global_arguments, namespace.
+
+    Raises
+    ------
+    ConfigError
+        A parameter is unknown, of the wrong type or out of range.
+
+    """
+
+    default_name: ClassVar[str]
+    manual: ClassVar[Manual]
+    configs: ClassVar[tuple[type[Config], ...]]
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(self.default_name, automatically_declare_parameters_from_overrides=True,
+                         **options)
+        self.settings: list[Any] = parameters.declare(self, self.configs)
+        self.diagnostics = Diagnostics(self, self.manual.purpose)
+
+    def work(self, spin: Callable[[float], bool]) -> int:
+        """
+        Work until told to stop, and return the exit code.
+
+        Parameters
+        ----------
+        spin : callable
+            Runs callbacks for at most the given seconds; False once the node shall stop.
+
+        """
+        while spin(_SPIN_S):
+            pass
+        return EXIT_OK
+
+    def close(self) -> None:
+        """Finish what is under way; called before the node is destroyed."""
+
+
+def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) -> int:
+    """
+    Run a node as a process until it is done or gets SIGINT or SIGTERM; return the exit code.
+
+    Parameters
+    ----------
+    node_class : type
+        A PipelineNode.
+    args : sequence of str, optional
+        Command line without the program; that of the process if not given.
+
+    """
+    arguments = list(sys.argv[1:] if args is None else args)
+    try:
+        _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
+    except SystemExit as end:  # --help, or an argument that is none
+        return EXIT_OK if end.code is None else int(end.code)
+    stop = Event()
+    with _stopping(stop):
+        context = Context()
+        try:
+            # rclpy's own handlers shut the context down under a callback that is publishing.
+            rclpy.init(args=arguments, context=context,
+                       signal_handler_options=SignalHandlerOptions.NO)
+            return _live(node_class, context, stop)
+        except (AdversarialLcdError, *_BAD_ARGUMENTS) as error:
+            print(f'{node_class.default_name}: {_one_line(error)}', file=sys.stderr)
+            known = isinstance(error, AdversarialLcdError) and not isinstance(error, ConfigError)
+            return EXIT_ERROR if known else EXIT_USAGE
+        finally:
+            _ignore_signals()
+            context.try_shutdown()
+
+
+def _live(node_class: type[PipelineNode], context: Context, stop: Event) -> int:
+    node = node_class(context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        return node.work(lambda seconds: _spin(executor, stop, seconds))
+    finally:
+        # A second Ctrl-C, or launch's, must not hit what follows.
+        _ignore_signals()
+        node.close()
+        executor.shutdown()
+        node.destroy_node()
+
+
+def _spin(executor: Executor, stop: Event, seconds: float) -> bool:
+    if not stop.is_set():
+        executor.spin_once(timeout_sec=seconds)
+    return not stop.is_set()
+
+
+@contextmanager
+def _stopping(stop: Event) -> Iterator[None]:
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _ignore_signals() -> None:
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())
+
+
+def _parser(node_class: type[PipelineNode]) -> argparse.ArgumentParser:
+    manual = node_class.manual
+    lines = ['Subscribes:', *(f'  {line}' for line in manual.subscribes),
+             'Publishes:', *(f'  {line}' for line in manual.publishes),
+             'Parameters (--ros-args -p NAME:=VALUE, or --params-file FILE):',
+             *parameters.describe(node_class.configs)]
+    return argparse.ArgumentParser(
+        prog=node_class.default_name, description=manual.purpose, epilog='\n'.join(lines),
+        usage='%(prog)s [-h] [--ros-args -r NAME:=NAME -p NAME:=VALUE --params-file FILE]',
+        formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -1,0 +1,128 @@
+"""The node lcd: one decision for each graph, answers that leave no trace, damage survived."""
+
+from dataclasses import replace
+import struct
+
+from graph_factory import make_graph
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros import codec
+
+pytest.importorskip('rclpy', reason='rclpy is not installed')
+
+from adversarial_lcd_ros.nodes.lcd import LcdNode
+from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+
+SECOND = 1_000_000_000
+EDGES = [(0, 1), *((0, k) for k in range(2, 12)), *((k, k + 1) for k in range(2, 39))]
+
+
+def graph(index):
+    return make_graph(40, EDGES, stamp_ns=index * SECOND + 7, sequence=index)
+
+
+def damaged():
+    """Yield messages that must be refused: broken outside, inside, or in what they say."""
+    good = codec.encode_graph(graph(1))
+    wire = wrap(good)
+    yield 'empty message', b''
+    yield 'no encapsulation', b'\xff' * 40
+    yield 'outer length 2 GB', wire[:12] + struct.pack('<I', 2**31 - 1) + wire[16:]
+    yield 'outer cut', wire[:-5]
+    yield 'empty payload', wrap(b'')
+    yield 'payload cut', wrap(good[:len(good) // 2])
+    yield 'random payload', wrap(np.random.default_rng(0).bytes(500))
+    tiers = good.index(struct.pack('<I', 40) + bytes(2) + b'\x01' * 38)
+    yield 'inner length 2 GB', wrap(good[:tiers] + struct.pack('<I', 2**31 - 1)
+                                    + good[tiers + 4:])
+    position = graph(1).position.tobytes()
+    nan = np.full(80, np.nan, np.float32).tobytes()
+    yield 'not finite', wrap(good.replace(position, nan))
+    target = graph(1).edge[:, 1].tobytes()
+    nowhere = np.full(len(EDGES), 4000, np.uint32).tobytes()
+    yield 'edge to nowhere', wrap(good.replace(target, nowhere))
+
+
+DAMAGED = dict(damaged())
+
+
+@pytest.fixture
+def lcd(ros, lcd_model):
+    return ros.start(LcdNode, model=lcd_model, min_gap_s=2)
+
+
+def test_every_graph_gets_one_decision(ros, lcd):
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    for index in range(6):
+        graphs.publish(wrap(codec.encode_graph(graph(index))))
+    ros.until(lambda: len(decisions) == 6)
+    assert [(d.stamp_ns, d.sequence, d.frame_id) for d in decisions] == [
+        (graph(k).stamp_ns, k, 'camera') for k in range(6)]
+    assert [d.is_loop for d in decisions] == [False, False, True, True, True, True]
+    assert lcd.detector.keyframe_count == 6
+
+
+def test_queries_are_answered_and_forgotten(ros, lcd):
+    answers = ros.collect('answer', lambda wire: codec.decode_answer(unwrap(wire)))
+    graphs, queries = ros.publisher('graph'), ros.publisher('query')
+    ros.matched(graphs)
+    ros.matched(queries)
+    graphs.publish(wrap(codec.encode_graph(graph(0))))
+    ros.until(lambda: lcd.detector.keyframe_count == 1)
+    for number in range(20):
+        queries.publish(wrap(codec.encode_query(codec.LcdQuery(2**40 + number, graph(5)))))
+    ros.until(lambda: len(answers) == 20)
+    assert [answer.id for answer in answers] == [2**40 + number for number in range(20)]
+    assert {answer.probability for answer in answers} == {
+        lcd.detector.judge(graph(5)).probability}
+    assert lcd.detector.keyframe_count == 1
+
+
+@pytest.mark.parametrize('name', DAMAGED)
+def test_damaged_messages_are_refused_counted_and_survived(ros, lcd, name):
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    graphs, queries = ros.publisher('graph'), ros.publisher('query')
+    ros.matched(graphs)
+    ros.matched(queries)
+    for publisher in (graphs, queries):
+        publisher.publish(DAMAGED[name])
+    ros.until(lambda: lcd.diagnostics['refused graph'] and lcd.diagnostics['refused query'])
+    graphs.publish(wrap(codec.encode_graph(graph(1))))
+    ros.until(lambda: decisions)
+    assert decisions[0].sequence == 1
+    assert lcd.detector.keyframe_count == 1
+
+
+def test_graphs_without_nodes_words_or_edges_are_decided(ros, lcd):
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    bare = codec.MultiTierGraph(SECOND, 'camera', 0, 640, 480)
+    wordless = replace(graph(9), word=bare.word, word_weight=bare.word_weight)
+    sent = [bare, replace(bare, stamp_ns=9 * SECOND), wordless,
+            make_graph(40, [], stamp_ns=20 * SECOND), graph(30)]
+    for one in sent:
+        graphs.publish(wrap(codec.encode_graph(one)))
+    ros.until(lambda: len(decisions) == len(sent))
+    assert [d.stamp_ns for d in decisions] == [one.stamp_ns for one in sent]
+
+
+def test_diagnostics_tell_keyframes_and_refusals(ros, lcd):
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+    found = ros.collect('/diagnostics', lambda message: message.status[0], DiagnosticArray,
+                        raw=False)
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    graphs.publish(wrap(codec.encode_graph(graph(0))))
+    graphs.publish(b'junk')
+    ros.until(lambda: lcd.diagnostics['refused graph'])
+    lcd.diagnostics.publish()
+    ros.until(lambda: any(status.level == DiagnosticStatus.WARN for status in found))
+    status = next(status for status in found if status.level == DiagnosticStatus.WARN)
+    values = {value.key: value.value for value in status.values}
+    assert (values['keyframes'], values['received graphs'], values['refused graph']) == (
+        '1', '2', '1')
+    assert status.name.startswith('lcd: ')
