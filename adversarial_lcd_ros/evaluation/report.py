@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+import shlex
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -96,6 +97,7 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
         'pictures': [(title, caption, _uri(data, 'jpeg'))
                      for title, caption, data in read_pictures(folder)],
         'sample': _sample(summary), 'configuration': configuration,
+        'command_line': shlex.join(configuration['command_line']),
         'environment': read_json(folder / ENVIRONMENT)}
     path = folder / REPORT
     path.write_text(_template().render(values), encoding='utf-8')
