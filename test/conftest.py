@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from ros_fixtures import lcd_model, ros  # noqa: F401
+from ros_fixtures import lcd_model, ros, vocabulary  # noqa: F401
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / 'shared' / 'data'
 

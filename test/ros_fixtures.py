@@ -42,7 +42,12 @@ class Ros:
     def stop(self, node):
         """End a node as its process would."""
         self._nodes.remove(node)
+        self._end(node)
+
+    def _end(self, node):
         self.executor.remove_node(node)
+        if node is not self.probe:
+            node.close()
         node.destroy_node()
 
     def publisher(self, topic, message=None, **qos):
@@ -81,8 +86,7 @@ class Ros:
 
     def close(self):
         for node in reversed(self._nodes):
-            self.executor.remove_node(node)
-            node.destroy_node()
+            self._end(node)
         self.executor.shutdown()
         self.context.shutdown()
 
@@ -106,4 +110,17 @@ def lcd_model(tmp_path):
     channels = TARGETS['wl'].channels
     path = tmp_path / 'wl.json'
     Decision('wl', channels, (10.0,) * len(channels), -10.0).save(path)
+    return str(path)
+
+
+@pytest.fixture
+def vocabulary(tmp_path):
+    """Return the path of a small vocabulary of random words."""
+    import numpy as np
+
+    from adversarial_lcd_ros.vision.vocabulary import Vocabulary
+    rng = np.random.default_rng(1)
+    path = tmp_path / 'vocabulary.npz'
+    Vocabulary(rng.integers(0, 256, (8 + 64, 32)).astype(np.uint8), np.ones(64, np.float32),
+               8, 2).save(path)
     return str(path)

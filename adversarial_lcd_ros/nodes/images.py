@@ -12,13 +12,13 @@ from adversarial_lcd_ros.errors import CodecError
 
 # Encoding to bytes a pixel, and what turns it into BGR.
 _ENCODINGS: dict[str, tuple[int, int | None]] = {
-    'bgr8': (3, None), 'rgb8': (3, cv2.COLOR_RGB2BGR), 'mono8': (1, cv2.COLOR_GRAY2BGR)}
+    'bgr8': (3, None), 'rgb8': (3, cv2.COLOR_RGB2BGR), 'mono8': (1, None)}
 MAX_PIXELS = 2**27
 
 
 def image_pixels(message: Any) -> NDArray[np.uint8]:
     """
-    Return the pixels of a sensor_msgs/Image as BGR, uint8, shape (height, width, 3).
+    Return the pixels of a sensor_msgs/Image, uint8: (height, width, 3) BGR, or grey without 3.
 
     Raises
     ------
@@ -38,11 +38,9 @@ def image_pixels(message: Any) -> NDArray[np.uint8]:
             f'{message.encoding} image of {width} x {height} pixels with {len(message.data)} '
             f'bytes in rows of {step}: expected at least {width * channels} a row')
     rows: NDArray[np.uint8] = np.frombuffer(message.data, np.uint8, step * height)
-    pixels = rows.reshape(height, step)[:, :width * channels].reshape(height, width, channels)
-    if conversion is None:
-        return np.ascontiguousarray(pixels)
-    converted: NDArray[np.uint8] = cv2.cvtColor(np.ascontiguousarray(pixels), conversion)
-    return converted
+    shape = (height, width, 3) if channels == 3 else (height, width)
+    pixels = np.ascontiguousarray(rows.reshape(height, step)[:, :width * channels]).reshape(shape)
+    return pixels if conversion is None else np.asarray(cv2.cvtColor(pixels, conversion))
 
 
 def compressed_pixels(message: Any) -> NDArray[np.uint8]:

@@ -16,16 +16,16 @@ _OBJECT = (40, 120, 250)
 
 def draw_graph(image: NDArray[np.uint8], graph: MultiTierGraph) -> NDArray[np.uint8]:
     """
-    Return the frame with objects as boxes, features as dots, and edges, BGR, same shape.
+    Return the frame with objects as boxes, features as dots, and edges, BGR.
 
     Parameters
     ----------
-    image : uint8, (height, width, 3)
-        BGR; not changed.
+    image : uint8, (height, width, 3) BGR or (height, width) grey
+        Not changed.
     graph : MultiTierGraph
 
     """
-    canvas = image.copy()
+    canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
     place = np.rint(graph.position).astype(np.int32)
     touches_object = (graph.edge < graph.object_count).any(axis=1)
     for chosen, colour in ((~touches_object, _FEATURE_EDGE), (touches_object, _OBJECT_EDGE)):
@@ -36,4 +36,4 @@ def draw_graph(image: NDArray[np.uint8], graph: MultiTierGraph) -> NDArray[np.ui
         low = np.rint(centre - size / 2).astype(int)
         high = np.rint(centre + size / 2).astype(int)
         cv2.rectangle(canvas, (int(low[0]), int(low[1])), (int(high[0]), int(high[1])), _OBJECT, 2)
-    return canvas
+    return np.asarray(canvas)

@@ -1,0 +1,121 @@
+"""The node graph_builder: camera frames in, multi-tier graphs out."""
+
+from __future__ import annotations
+
+from array import array
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+from adversarial_lcd_ros.codec import encode_graph
+from adversarial_lcd_ros.config import BuilderConfig, GraphBuilderNodeConfig
+from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
+from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
+from adversarial_lcd_ros.nodes.overlay import draw_graph
+from adversarial_lcd_ros.nodes.payload import wrap
+from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.vision.builder import GraphBuilder
+
+IMAGE, COMPRESSED = 'image', 'image/compressed'
+_REMEMBERED_STAMPS = 64
+
+
+class GraphBuilderNode(PipelineNode):
+    """Runs a GraphBuilder on topics."""
+
+    default_name = 'graph_builder'
+    configs = (BuilderConfig, GraphBuilderNodeConfig)
+    manual = Manual(
+        'camera frames to multi-tier graphs of objects and visual features',
+        subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',
+                    f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG or PNG)'),
+        publishes=('graph (std_msgs/UInt8MultiArray, MultiTierGraph): one for each frame',
+                   'overlay (sensor_msgs/Image): the graph over the frame, if anyone listens',
+                   '/diagnostics (diagnostic_msgs/DiagnosticArray): counts, rates, latency'))
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        config, node_config = self.settings
+        self._builder = GraphBuilder(config)
+        self._sequence = 0
+        self._graphs = create_payload_publisher(self, 'graph')
+        self._overlays = self.create_publisher(Image, 'overlay', qos_profile_sensor_data)
+        self._inputs = {
+            topic: MirroredSubscription(
+                self, message, topic, partial(self._on_frame, topic, pixels),
+                depth=node_config.queue_depth)
+            for topic, message, pixels in ((IMAGE, Image, image_pixels),
+                                           (COMPRESSED, CompressedImage, compressed_pixels))}
+        self._stamps: dict[str, deque[int]] = {
+            topic: deque(maxlen=_REMEMBERED_STAMPS) for topic in self._inputs}
+        self._last_number: dict[str, int] = {}
+
+    def _on_frame(self, topic: str, pixels: Callable[[Any], NDArray[np.uint8]], message: Any,
+                  info: Mapping[str, Any]) -> None:
+        arrival_s = time.perf_counter()
+        self.diagnostics.count('received frames')
+        self._count_lost(topic, info['publication_sequence_number'])
+        stamp = message.header.stamp
+        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+        if self._is_repeat(topic, stamp_ns):
+            return
+        sequence, self._sequence = self._sequence, self._sequence + 1
+        try:
+            image = pixels(message)
+            graph = self._builder.build(image, stamp_ns, message.header.frame_id, sequence)
+        except AdversarialLcdError as error:
+            self.diagnostics.refuse('frame', error)
+            return
+        self._graphs.publish(wrap(encode_graph(graph)))
+        self.diagnostics.count('published graphs')
+        self.diagnostics.time(time.perf_counter() - arrival_s)
+        if self._overlays.get_subscription_count():
+            self._publish_overlay(message.header, image, graph)
+
+    def _is_repeat(self, topic: str, stamp_ns: int) -> bool:
+        """Tell whether the frame came already on the other topic: drivers offer both."""
+        self._stamps[topic].append(stamp_ns)
+        if any(stamp_ns in stamps for name, stamps in self._stamps.items() if name != topic):
+            self.diagnostics.count('dropped repeats')
+            return True
+        return False
+
+    def _count_lost(self, topic: str, number: int | None) -> None:
+        # Frames that gave way to newer ones in a full queue leave a gap in the publisher's count.
+        if number is None:
+            return
+        last = self._last_number.get(topic, number)
+        self._last_number[topic] = number
+        if number > last + 1 and self.count_publishers(topic) == 1:
+            self.diagnostics.count('lost frames', number - last - 1)
+
+    def _publish_overlay(self, header: Header, image: NDArray[np.uint8],
+                         graph: MultiTierGraph) -> None:
+        drawn = draw_graph(image, graph)
+        height, width = drawn.shape[:2]
+        self._overlays.publish(Image(header=header, height=height, width=width, encoding='bgr8',
+                                     step=3 * width, data=array('B', drawn.tobytes())))
+
+    def close(self) -> None:
+        """Stop the thread of the network."""
+        self._builder.close()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    return run_node(GraphBuilderNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
