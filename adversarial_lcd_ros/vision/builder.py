@@ -1,0 +1,168 @@
+"""Camera image -> multi-tier graph (paper, Fig. 2 a-c)."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, OBJECT_TIER, MultiTierGraph
+from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.vision.features import FeatureExtractor, Features, spread, to_grey
+from adversarial_lcd_ros.vision.objects import (
+    Detections,
+    ObjectDetector,
+    default_model_path,
+    filter_objects,
+)
+from adversarial_lcd_ros.vision.vocabulary import Vocabulary
+
+
+class GraphBuilder:
+    """
+    Builds the graph of a view: objects are anchors, features hang on them and on each other.
+
+    The network runs beside the feature extraction, in a thread of its own. Same image, same
+    settings, same bytes. Close it, or use it as a context manager.
+    """
+
+    def __init__(self, config: BuilderConfig | None = None) -> None:
+        self.config = config or BuilderConfig()
+        path = self.config.vocabulary
+        self._vocabulary = Vocabulary.load(Path(path) if path else model_path('vocabulary.npz'))
+        self._features = FeatureExtractor(self.config.detected_features,
+                                          self.config.fast_threshold)
+        self._objects: ObjectDetector | None = None
+        if self.config.detector == 'onnx':
+            model = Path(self.config.model) if self.config.model else default_model_path()
+            self._objects = ObjectDetector(model, self.config.object_score, self.config.threads)
+        self._thread = ThreadPoolExecutor(1, 'objects')
+
+    def build(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
+              sequence: int = 0) -> MultiTierGraph:
+        """
+        Return the graph of an image.
+
+        Parameters
+        ----------
+        image : uint8, (h, w, 3) BGR or (h, w) grey
+        stamp_ns : int
+            Acquisition time, nanoseconds.
+        frame_id : str
+        sequence : int
+
+        Raises
+        ------
+        GraphError
+            The image is empty or of another type.
+
+        """
+        grey = to_grey(image)
+        coming = self._thread.submit(self._detect, image)
+        height, width = grey.shape
+        features = self._features.extract(grey)
+        words = self._vocabulary.words(features.descriptor)
+        kept = spread(features, self.config.features, width, height)
+        return assemble(features[kept], words[kept], coming.result(),
+                        self._vocabulary.vector(words), self.config.feature_neighbours,
+                        width=width, height=height, stamp_ns=stamp_ns, frame_id=frame_id,
+                        sequence=sequence)
+
+    def _detect(self, image: NDArray[np.uint8]) -> Detections:
+        if self._objects is None:
+            return Detections.none()
+        if image.ndim == 2:
+            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
+        return filter_objects(self._objects.detect(image), image.shape[1], image.shape[0],
+                              self.config)
+
+    def close(self) -> None:
+        """Stop the thread of the network."""
+        self._thread.shutdown()
+
+    def __enter__(self) -> GraphBuilder:
+        """Return the builder."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the builder."""
+        self.close()
+
+
+def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
+             bow: tuple[NDArray[np.uint32], NDArray[np.float32]], neighbours: int, *, width: int,
+             height: int, stamp_ns: int, frame_id: str, sequence: int) -> MultiTierGraph:
+    """
+    Return the multi-tier graph of features and objects.
+
+    Edges: every two objects; a feature and every box that holds it, or else the nearest
+    object; a feature and its nearest features. Lengths are distances over the image diagonal.
+
+    Parameters
+    ----------
+    features : Features
+        k of them.
+    words : uint32, (k,)
+    objects : Detections
+    bow : (uint32, float32)
+        Words of the whole frame and their weights.
+    neighbours : int
+        Nearest features that each feature is joined with.
+    width, height, stamp_ns, frame_id, sequence
+        Of the frame.
+
+    """
+    first = len(objects)
+    centre = objects.box[:, :2] + objects.box[:, 2:] / 2
+    edge = np.concatenate([
+        np.stack(np.triu_indices(first, 1), axis=1),
+        _spokes(features.position, objects.box, centre, first),
+        _neighbour_edges(features.position, neighbours) + first]).astype(np.uint32)
+    edge = np.unique(edge, axis=0).reshape(-1, 2)
+    position = np.concatenate([centre, features.position]).astype(np.float32)
+    diagonal = np.float32(np.hypot(width, height))
+    offset = position[edge[:, 0]] - position[edge[:, 1]]
+    return MultiTierGraph(
+        stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence, width=width, height=height,
+        tier=np.repeat([OBJECT_TIER, FEATURE_TIER], [first, len(features)]).astype(np.uint8),
+        label=np.concatenate([objects.label, words]).astype(np.uint32),
+        position=position,
+        size=np.concatenate([objects.box[:, 2:], np.repeat(features.size[:, None], 2, axis=1)]),
+        score=np.concatenate([objects.score, features.score]),
+        descriptor=np.concatenate(
+            [np.zeros((first, DESCRIPTOR_BYTES), np.uint8), features.descriptor]),
+        edge=edge,
+        edge_length=(np.hypot(offset[:, 0], offset[:, 1]) / diagonal).astype(np.float32),
+        word=bow[0], word_weight=bow[1])
+
+
+def _spokes(position: NDArray[np.float32], box: NDArray[np.float32], centre: NDArray[np.float32],
+            first: int) -> NDArray[np.int64]:
+    """Return the edges (object, feature), features counted from ``first``, shape (e, 2)."""
+    if not len(box) or not len(position):
+        return np.zeros((0, 2), np.int64)
+    offset = position[:, None] - box[None, :, :2]
+    inside = ((offset >= 0) & (offset <= box[None, :, 2:])).all(axis=2)
+    lost = ~inside.any(axis=1)
+    distance = np.linalg.norm(position[lost, None] - centre[None], axis=2)
+    inside[lost, distance.argmin(axis=1)] = True
+    feature, owner = np.nonzero(inside)
+    return np.stack([owner, feature + first], axis=1)
+
+
+def _neighbour_edges(position: NDArray[np.float32], neighbours: int) -> NDArray[np.int64]:
+    """Return the edges of each feature with its k nearest, source < target, with repeats."""
+    count = len(position)
+    nearest = min(neighbours + 1, count)
+    if nearest < 2:
+        return np.zeros((0, 2), np.int64)
+    _, near = cKDTree(position).query(position, nearest)
+    pairs = np.stack([np.repeat(np.arange(count), nearest), near.ravel()], axis=1)
+    # Features of several octaves share a place: a feature need not be its own first neighbour.
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    return np.sort(pairs, axis=1).astype(np.int64)
