@@ -100,18 +100,17 @@ def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) 
 
     """
     arguments = list(sys.argv[1:] if args is None else args)
-    try:
-        _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
-    except SystemExit as end:  # --help, or an argument that is none
-        return EXIT_OK if end.code is None else int(end.code)
     stop = Event()
-    with _stopping(stop):
+    with _stopping(stop, restore=args is not None):
         context = Context()
         try:
+            _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
             # rclpy's own handlers shut the context down under a callback that is publishing.
             rclpy.init(args=arguments, context=context,
                        signal_handler_options=SignalHandlerOptions.NO)
             return _live(node_class, context, stop)
+        except SystemExit as end:  # argparse: --help, or an argument that is none
+            return int(end.code or EXIT_OK)
         except (AdversarialLcdError, *_BAD_ARGUMENTS) as error:
             print(f'{node_class.default_name}: {_one_line(error)}', file=sys.stderr)
             known = isinstance(error, AdversarialLcdError) and not isinstance(error, ConfigError)
@@ -142,13 +141,15 @@ def _spin(executor: Executor, stop: Event, seconds: float) -> bool:
 
 
 @contextmanager
-def _stopping(stop: Event) -> Iterator[None]:
+def _stopping(stop: Event, restore: bool) -> Iterator[None]:
+    """Turn signals into the event; a process of its own leaves them ignored until it is gone."""
     before = {number: signal.signal(number, lambda *_: stop.set()) for number in _SIGNALS}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if restore:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 def _ignore_signals() -> None:
