@@ -7,6 +7,7 @@ import signal
 import pytest
 
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.paths import share_path
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
@@ -34,7 +35,7 @@ def test_help_tells_topics_and_every_parameter(main, capsys, name):
                       if isinstance(c, type) and getattr(c, 'default_name', '') == name)
     for config in node_class.configs:
         for entry in fields(config):
-            assert f'  {entry.name} (' in text
+            assert f'  {entry.name} := ' in text
     assert 'Subscribes:' in text
     assert '/diagnostics' in text
 
@@ -109,6 +110,17 @@ def test_a_whole_number_is_taken_for_a_real_parameter(ros):
     node = ros.start(AttackerNode, ratio=1, deadline_ms=50)
     assert node.get_parameter('ratio').value == 1.0
     assert node.settings[0].deadline_ms == 50.0
+
+
+def test_the_parameter_file_that_ships_is_read(ros, lcd_model, tmp_path):
+    shipped = share_path('config/params.yaml').read_text(encoding='utf-8')
+    changed = tmp_path / 'params.yaml'
+    changed.write_text(shipped.replace('candidates: 8', 'candidates: 5'), encoding='utf-8')
+    node = LcdNode(context=ros.context, use_global_arguments=False, namespace='robot1',
+                   cli_args=['--ros-args', '--params-file', str(changed),
+                             '-p', f'model:={lcd_model}'])
+    assert node.detector.config.candidates == 5
+    node.destroy_node()
 
 
 def test_use_sim_time_is_no_unknown_parameter(ros):

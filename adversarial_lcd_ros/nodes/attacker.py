@@ -17,13 +17,13 @@ from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
-from adversarial_lcd_ros.config import AttackConfig, AttackerNodeConfig
 from adversarial_lcd_ros.errors import CodecError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.oracle import TopicOracle
 from adversarial_lcd_ros.nodes.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 INPUT, OUTPUT = 'graph_clean', 'graph'
 
@@ -36,7 +36,7 @@ class AttackerNode(PipelineNode):
     """
 
     default_name = 'attacker'
-    configs = (AttackConfig, AttackerNodeConfig)
+    configs = NODE_CONFIGS['attacker']
     manual = Manual(
         'man in the middle that perturbs the edges of multi-tier graphs',
         subscribes=(f'{INPUT} (std_msgs/UInt8MultiArray, MultiTierGraph)',

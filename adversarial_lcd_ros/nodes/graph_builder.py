@@ -17,7 +17,6 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from adversarial_lcd_ros.codec import encode_graph
-from adversarial_lcd_ros.config import BuilderConfig, GraphBuilderNodeConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
@@ -25,6 +24,7 @@ from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.overlay import draw_graph
 from adversarial_lcd_ros.nodes.payload import wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 IMAGE, COMPRESSED = 'image', 'image/compressed'
@@ -35,7 +35,7 @@ class GraphBuilderNode(PipelineNode):
     """Runs a GraphBuilder on topics."""
 
     default_name = 'graph_builder'
-    configs = (BuilderConfig, GraphBuilderNodeConfig)
+    configs = NODE_CONFIGS['graph_builder']
     manual = Manual(
         'camera frames to multi-tier graphs of objects and visual features',
         subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',

@@ -10,7 +10,6 @@ from typing import Any
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.nodes.endpoints import (
@@ -20,13 +19,14 @@ from adversarial_lcd_ros.nodes.endpoints import (
 )
 from adversarial_lcd_ros.nodes.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 
 class LcdNode(PipelineNode):
     """Runs a LoopClosureDetector on topics."""
 
     default_name = 'lcd'
-    configs = (LcdConfig,)
+    configs = NODE_CONFIGS['lcd']
     manual = Manual(
         'loop closure detection on multi-tier graphs',
         subscribes=('graph (std_msgs/UInt8MultiArray, MultiTierGraph): judged, then remembered',

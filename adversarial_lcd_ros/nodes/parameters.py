@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from adversarial_lcd_ros.config import Config
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.settings import limits
 
 # Declared by rclpy itself, on every node.
 _RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service')
@@ -82,14 +83,5 @@ def describe(configs: Sequence[type[Config]]) -> Iterator[str]:
     """Yield one line of help for each parameter."""
     for config in configs:
         for entry in fields(config):
-            kind = f'{type(entry.default).__name__}, {entry.default!r}{_limits(entry)}'
-            yield f'  {entry.name} ({kind}): {entry.metadata["help"]}'
-
-
-def _limits(entry: Field[Any]) -> str:
-    if entry.metadata['choices']:
-        return f', one of {", ".join(entry.metadata["choices"])}'
-    low, high = entry.metadata['low'], entry.metadata['high']
-    if low is None and high is None:
-        return ''
-    return f', {"any" if low is None else low} to {"any" if high is None else high}'
+            accepted = ', '.join(filter(None, (type(entry.default).__name__, limits(entry))))
+            yield f'  {entry.name} := {entry.default!r} ({accepted}): {entry.metadata["help"]}'
