@@ -1,0 +1,235 @@
+"""
+Bags in and out of the pipeline, without ROS: messages stay the bytes that they are.
+
+``Replay`` gives the frames of a bag, and the ground truth beside them, in the order and with
+the stamps of a replay; ``BagRecorder`` keeps what comes of them; ``read_payloads`` reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import threading
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from adversarial_lcd_ros.codec import typestore
+from adversarial_lcd_ros.config import ReplayConfig
+from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.bagfile import (
+    COMPRESSED_IMAGE,
+    IMAGE,
+    PAYLOAD,
+    POSE,
+    BagFile,
+    BagWriter,
+    cdr_stamp_ns,
+    with_cdr_stamp,
+)
+from adversarial_lcd_ros.sequences.sequence import check_order
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+# Graphs to replay where a bag has no images; the clean ones are what came before any attack.
+GRAPH_TOPICS = ('graph_clean', 'graph')
+
+
+class Replay:
+    """
+    The messages of one replay of a bag, in order.
+
+    Frames are the camera images; in a bag without any, the graphs on graph_clean, else on
+    graph. Of the rest only poses (ground truth) are replayed: what the pipeline itself has
+    published, and /clock, would meet the pipeline's own.
+
+    Iterating gives (topic, message type, stamp in nanoseconds, CDR). The stamp is that of the
+    message's header. When a replay loops, the stamps in the messages go on rising.
+
+    Parameters
+    ----------
+    path : Path
+        A rosbag2: its folder, or its .mcap or .db3 file.
+    config : ReplayConfig
+        start_s and duration_s count from the first frame; stride leaves out frames, not poses.
+
+    Attributes
+    ----------
+    topics : dict of str to str
+        What is replayed: topic to message type.
+    frame_topics : tuple of str
+        The topic of the frames.
+    frame_count : int
+        Frames of the whole replay, loops included.
+
+    Raises
+    ------
+    SequenceError
+        The bag is missing, truncated, out of order, or has no frames, or frames on several
+        topics; or start, duration and stride leave no frame.
+
+    """
+
+    def __init__(self, path: Path, config: ReplayConfig) -> None:
+        self._path, self._config = Path(path), config
+        with BagFile(self._path) as bag:
+            self._frame_topic = _frame_topic(bag)
+            others = bag.of_type(POSE)
+            self.topics = {topic: bag.topics[topic] for topic in (self._frame_topic, *others)}
+            self.frame_topics = (self._frame_topic,)
+            self._stamps = check_order(
+                [_stamp_ns(bag.topics[topic], wire)
+                 for topic, _, wire in bag.messages([self._frame_topic])], self._path)
+        self._first_ns, self._last_ns = self._span()
+        self._kept = set(self._stamps[
+            (self._stamps >= self._first_ns) & (self._stamps <= self._last_ns)
+        ][::config.stride].tolist())
+        if not self._kept:
+            length_s = (self._stamps[-1] - self._stamps[0]) / 1e9
+            raise SequenceError(
+                f'no frame of {self._path} is left: it is {length_s:.3f} s long, and the replay '
+                f'is to start at {config.start_s:g} s')
+        self.frame_count = len(self._kept) * config.loop
+
+    def _span(self) -> tuple[int, int]:
+        first_ns = int(self._stamps[0]) + round(self._config.start_s * 1e9)
+        if not self._config.duration_s:
+            return first_ns, int(self._stamps[-1])
+        return first_ns, first_ns + round(self._config.duration_s * 1e9)
+
+    def __iter__(self) -> Iterator[tuple[str, str, int, bytes]]:
+        period_ns = self._period_ns()
+        for loop in range(self._config.loop):
+            for topic, kind, stamp_ns, wire in self._once():
+                if loop:
+                    stamp_ns += loop * period_ns
+                    wire = _with_stamp(kind, wire, stamp_ns)
+                yield topic, kind, stamp_ns, wire
+
+    def _once(self) -> Iterator[tuple[str, str, int, bytes]]:
+        with BagFile(self._path) as bag:
+            for topic, _, wire in bag.messages(list(self.topics)):
+                kind = self.topics[topic]
+                stamp_ns = _stamp_ns(kind, wire)
+                if (stamp_ns in self._kept if topic == self._frame_topic
+                        else self._first_ns <= stamp_ns <= self._last_ns):
+                    yield topic, kind, stamp_ns, wire
+
+    def _period_ns(self) -> int:
+        """Return the time from one loop to the next: the span and one frame more."""
+        frames = sorted(self._kept)
+        gap_ns = int(np.median(np.diff(frames))) if len(frames) > 1 else 1_000_000_000
+        return min(self._last_ns, int(self._stamps[-1])) - self._first_ns + gap_ns
+
+
+def _frame_topic(bag: BagFile) -> str:
+    images = bag.of_type(IMAGE, COMPRESSED_IMAGE)
+    if len(images) > 1:
+        raise SequenceError(f'bag {bag.path} has images on {", ".join(images)}: make a bag of one '
+                            'with "adversarial-lcd import"')
+    if images:
+        return images[0]
+    graphs = {topic.rsplit('/', 1)[-1]: topic for topic in bag.of_type(PAYLOAD)}
+    for name in GRAPH_TOPICS:
+        if name in graphs:
+            return graphs[name]
+    there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(bag.topics.items()))
+    raise SequenceError(f'bag {bag.path} has neither images nor graphs to replay; it has '
+                        f'{there or "no topics"}')
+
+
+def _stamp_ns(message_type: str, wire: bytes) -> int:
+    return cdr_stamp_ns(_payload(wire) if message_type == PAYLOAD else wire)
+
+
+def _with_stamp(message_type: str, wire: bytes, stamp_ns: int) -> bytes:
+    if message_type != PAYLOAD:
+        return with_cdr_stamp(wire, stamp_ns)
+    message: Any = typestore().deserialize_cdr(wire, PAYLOAD)
+    message.data = np.frombuffer(with_cdr_stamp(message.data.tobytes(), stamp_ns), np.uint8)
+    return bytes(typestore().serialize_cdr(message, PAYLOAD))
+
+
+def _payload(wire: bytes) -> bytes:
+    try:
+        message: Any = typestore().deserialize_cdr(wire, PAYLOAD)
+    except Exception as error:
+        # rosbags reports most damage as SerdeError, the rest as whatever broke inside it.
+        raise SequenceError(f'{len(wire)} bytes are no {PAYLOAD}: {error!r}') from error
+    return bytes(message.data)
+
+
+def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
+    """
+    Yield (log time in nanoseconds, payload) of a topic of std_msgs/UInt8MultiArray.
+
+    A missing slash in front of the topic does not matter.
+
+    Raises
+    ------
+    SequenceError
+        The bag is missing or truncated, or has no such topic.
+
+    """
+    with BagFile(Path(path)) as bag:
+        name = f'/{topic.strip("/")}'
+        if bag.topics.get(name) != PAYLOAD:
+            there = ', '.join(bag.of_type(PAYLOAD)) or 'none'
+            raise SequenceError(f'bag {path} has no payloads on {name}; topics with payloads: '
+                                f'{there}')
+        for _, log_ns, wire in bag.messages([name]):
+            yield log_ns, _payload(wire)
+
+
+class BagRecorder:
+    """
+    Writes messages to a rosbag2 (MCAP), from any thread; the bag appears on ``close``.
+
+    Log times ascend: a message whose stamp does not follow the last one is logged one
+    nanosecond after it, so that a bag reads in the order in which it was written.
+
+    Raises
+    ------
+    SequenceError
+        The bag exists already, or the place cannot be written.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._writer: BagWriter | None = BagWriter(Path(path))
+        self._lock = threading.Lock()
+        self._last_ns = -1
+
+    def write(self, topic: str, message_type: str, stamp_ns: int, cdr: bytes) -> None:
+        """Write one message in CDR; raises SequenceError once the recorder is closed."""
+        with self._lock:
+            if self._writer is None:
+                raise SequenceError(f'{topic}: the recording is closed')
+            self._last_ns = max(stamp_ns, self._last_ns + 1)
+            self._writer.write(f'/{topic.strip("/")}', message_type, self._last_ns, cdr)
+
+    def close(self) -> None:
+        """Complete the bag; closing twice does nothing."""
+        with self._lock:
+            writer, self._writer = self._writer, None
+            if writer is not None:
+                writer.close()
+
+    def abort(self) -> None:
+        """Throw the recording away."""
+        with self._lock:
+            writer, self._writer = self._writer, None
+            if writer is not None:
+                writer.abort()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.abort()

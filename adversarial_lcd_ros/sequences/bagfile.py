@@ -1,0 +1,272 @@
+"""Bags on disk: read with checks, written so that a half-written one never looks finished."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+import shutil
+import struct
+import tempfile
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal
+
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag2 import Reader as Reader2
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from adversarial_lcd_ros.codec import typestore
+from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
+    from typing_extensions import Self
+
+IMAGE, COMPRESSED_IMAGE = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
+POSE = 'geometry_msgs/msg/PoseStamped'
+PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
+TF = 'tf2_msgs/msg/TFMessage'
+# What /tf was called before tf2, as in the bags of the TUM RGB-D benchmark.
+OLD_TF = ('tf/msg/tfMessage', 'tf/msg/TFMessage')
+ROS1_SUFFIX = '.bag'
+ROS2_SUFFIXES = ('.mcap', '.db3')
+METADATA = 'metadata.yaml'
+_NS = 1_000_000_000
+_BAG_VERSION: Literal[9] = 9
+_CDR_HEADER = 4  # bytes of encapsulation, then the stamp of a std_msgs/Header
+
+
+def is_bag(path: Path) -> bool:
+    """Tell whether a path looks like a bag: ROS 1 file, rosbag2 folder, or a rosbag2's file."""
+    if path.is_dir():
+        return (path / METADATA).is_file() or any(
+            child.suffix in ROS2_SUFFIXES for child in path.iterdir())
+    return path.suffix in (ROS1_SUFFIX, *ROS2_SUFFIXES)
+
+
+@cache
+def _ros1_typestore() -> Typestore:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg('geometry_msgs/TransformStamped[] transforms', TF))
+    return store
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turn whatever a damaged bag breaks into one SequenceError."""
+    try:
+        yield
+    except AdversarialLcdError:
+        raise
+    except Exception as error:
+        # A damaged bag can break anything in the reader: no list of classes is complete.
+        detail = str(error) or type(error).__name__
+        raise SequenceError(
+            f'bag {path} cannot be read ({detail}): it is truncated, damaged, or was not closed; '
+            'get it again, or repair it with "rosbag reindex" or "ros2 bag reindex"') from error
+
+
+class BagFile:
+    """
+    A bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), open for reading.
+
+    Only standard messages are decoded, by their published definitions: whatever else a bag
+    holds, also of types unknown here, does not get in the way.
+
+    Attributes
+    ----------
+    path : Path
+    topics : dict of str to str
+        Topic to message type (as in ROS 2: sensor_msgs/msg/Image).
+    counts : dict of str to int
+        Messages by topic, as the index of the bag says.
+
+    Raises
+    ------
+    SequenceError
+        The bag is missing, truncated or damaged.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.exists():
+            raise SequenceError(f'there is no bag {path}')
+        self._is_ros1 = path.is_file() and path.suffix == ROS1_SUFFIX
+        self._types = _ros1_typestore() if self._is_ros1 else typestore()
+        with _explained(path):
+            self._reader: Any = Reader1(path) if self._is_ros1 else Reader2(path)
+            self._reader.open()
+        connections: Sequence[Connection] = self._reader.connections
+        self.topics = {entry.topic: entry.msgtype for entry in connections}
+        self.counts = dict.fromkeys(self.topics, 0)
+        for entry in connections:
+            self.counts[entry.topic] += entry.msgcount
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._reader.close()
+
+    def of_type(self, *types: str) -> list[str]:
+        """Return the topics that hold messages of these types, sorted."""
+        return sorted(topic for topic, kind in self.topics.items()
+                      if kind in types and self.counts[topic])
+
+    def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
+        """
+        Yield (topic, log time in nanoseconds, bytes) of all messages of some topics.
+
+        Raises
+        ------
+        SequenceError
+            The bag is damaged, or holds fewer messages than its index says.
+
+        """
+        chosen = [entry for entry in self._reader.connections if entry.topic in topics]
+        if not chosen:
+            return
+        expected, found = sum(self.counts[topic] for topic in set(topics) & set(self.counts)), 0
+        with _explained(self.path):
+            for connection, log_ns, wire in self._reader.messages(connections=chosen):
+                found += 1
+                yield connection.topic, log_ns, bytes(wire)
+        if found != expected:
+            raise SequenceError(f'bag {self.path} is truncated: {found} of {expected} messages '
+                                f'on {", ".join(topics)} could be read')
+
+    def decode(self, topic: str, wire: bytes) -> Any:
+        """Return the message in the bytes of a topic; raises SequenceError."""
+        kind = TF if self.topics[topic] in OLD_TF else self.topics[topic]
+        with _explained(self.path):
+            return (self._types.deserialize_ros1(wire, kind) if self._is_ros1
+                    else self._types.deserialize_cdr(wire, kind))
+
+    def stamp_ns(self, wire: bytes) -> int:
+        """Return the stamp of a message that starts with a header; raises SequenceError."""
+        if not self._is_ros1:
+            return cdr_stamp_ns(wire)
+        if len(wire) < 12:
+            raise SequenceError(f'bag {self.path}: a message of {len(wire)} bytes has no header')
+        _, seconds, nanoseconds = struct.unpack_from('<III', wire)
+        return _join(seconds, nanoseconds)
+
+
+def _join(seconds: int, nanoseconds: int) -> int:
+    if not 0 <= nanoseconds < _NS:
+        raise SequenceError(f'stamp with {nanoseconds} nanoseconds: expected below {_NS}')
+    return seconds * _NS + nanoseconds
+
+
+def _time_format(cdr: bytes) -> str:
+    if len(cdr) < _CDR_HEADER + 8 or cdr[0] != 0 or cdr[1] not in (0, 1):
+        raise SequenceError(f'{len(cdr)} bytes starting with {cdr[:4].hex() or "nothing"} are no '
+                            'CDR of a message with a header')
+    return '<iI' if cdr[1] else '>iI'
+
+
+def cdr_stamp_ns(cdr: bytes) -> int:
+    """Return the stamp of the header that a message in CDR starts with; raises SequenceError."""
+    return _join(*struct.unpack_from(_time_format(cdr), cdr, _CDR_HEADER))
+
+
+def with_cdr_stamp(cdr: bytes, stamp_ns: int) -> bytes:
+    """Return a message in CDR that starts with a header, with another stamp in it."""
+    seconds, nanoseconds = divmod(stamp_ns, _NS)
+    if seconds >= 2**31:
+        raise SequenceError(f'{stamp_ns} ns is beyond the stamps of ROS 2, which end in 2038')
+    changed = bytearray(cdr)
+    struct.pack_into(_time_format(cdr), changed, _CDR_HEADER, seconds, nanoseconds)
+    return bytes(changed)
+
+
+def header(stamp_ns: int, frame_id: str) -> Any:
+    """Return a std_msgs/Header."""
+    types: Any = typestore().types
+    seconds, nanoseconds = divmod(stamp_ns, _NS)
+    return types['std_msgs/msg/Header'](
+        stamp=types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds),
+        frame_id=frame_id)
+
+
+class BagWriter:
+    """
+    Writes a rosbag2 (MCAP) beside its place, and moves it there once it is complete.
+
+    Until ``close`` there is only a hidden folder ``.<name>.*.partial`` beside the destination;
+    ``abort``, or an error inside the ``with`` block, removes it.
+
+    Raises
+    ------
+    SequenceError
+        The destination exists: without ``overwrite`` always, with it if it is no bag.
+
+    """
+
+    def __init__(self, destination: Path, *, overwrite: bool = False) -> None:
+        self._destination = destination.absolute()
+        _check_free(self._destination, overwrite)
+        try:
+            self._destination.parent.mkdir(parents=True, exist_ok=True)
+            # mkdtemp makes a name of its own: two imports at once do not meet.
+            self._folder = Path(tempfile.mkdtemp(
+                prefix=f'.{self._destination.name}.', suffix='.partial',
+                dir=self._destination.parent))
+        except OSError as error:
+            raise SequenceError(f'{destination} cannot be written: {error}') from error
+        # The MCAP file is named after its folder: the right name is one level further down.
+        self._writer = Writer(self._folder / self._destination.name, version=_BAG_VERSION,
+                              storage_plugin=StoragePlugin.MCAP)
+        self._writer.open()
+        self._connections: dict[str, Connection] = {}
+
+    def write(self, topic: str, message_type: str, stamp_ns: int, cdr: bytes) -> None:
+        """Write a message in CDR."""
+        connection = self._connections.get(topic)
+        if connection is None:
+            connection = self._connections[topic] = self._writer.add_connection(
+                topic, message_type, typestore=typestore())
+        self._writer.write(connection, stamp_ns, cdr)
+
+    def close(self) -> None:
+        """Complete the bag and move it to its place."""
+        self._writer.close()
+        if self._destination.exists():
+            self._destination.rename(self._folder / 'replaced')
+        (self._folder / self._destination.name).rename(self._destination)
+        shutil.rmtree(self._folder)
+
+    def abort(self) -> None:
+        """Throw the half-written bag away."""
+        self._writer.abort()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        if error is not None:
+            self.abort()
+            return
+        try:
+            self.close()
+        except BaseException:
+            self.abort()
+            raise
+
+
+def _check_free(destination: Path, overwrite: bool) -> None:
+    if not destination.exists():
+        return
+    if not overwrite:
+        raise SequenceError(f'{destination} exists already: remove it, give another name, or '
+                            'ask to overwrite it')
+    if not (destination / METADATA).is_file():
+        raise SequenceError(f'{destination} exists and is no bag (it has no {METADATA}): it is '
+                            'not overwritten')

@@ -1,0 +1,167 @@
+"""Sequences that are folders: TUM RGB-D, 7-Scenes, images in order, repeated walks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.frame import Frame, open_compressed
+from adversarial_lcd_ros.sequences.sequence import Sequence
+from adversarial_lcd_ros.sequences.trajectory import (
+    PLACE_INDEX,
+    Trajectory,
+    parse_stamp_ns,
+    read_trajectory,
+    text_rows,
+)
+
+TUM_IMAGES, TUM_TRUTH = 'rgb.txt', 'groundtruth.txt'
+DEFAULT_RATE_HZ = 30.0
+# Longer than any gap that a detector or a label leaves between a frame and its loops.
+WALK_GAP_S = 60.0
+_SUFFIXES = ('.jpg', '.jpeg', '.png')
+_SEVEN_SCENES_COLOUR = '.color.png'
+_ORTHOGONAL_TOLERANCE = 0.01
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Return the JPEG and PNG files of a folder; numbers in names count as numbers."""
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+    return sorted(paths, key=lambda path: [
+        (int(part), '') if part.isdigit() else (-1, part)
+        for part in re.split(r'([0-9]+)', path.name)])
+
+
+def walks_in(folder: Path) -> dict[Path, list[Path]]:
+    """Return the images of each subfolder, if each subfolder of a folder holds some."""
+    walks = {path: images_in(path) for path in sorted(folder.iterdir()) if path.is_dir()}
+    return walks if len(walks) > 1 and all(walks.values()) else {}
+
+
+def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
+    """
+    Open a folder in the layout of the TUM RGB-D benchmark.
+
+    Ground truth is groundtruth.txt, where it is there, unless another file is given.
+    """
+    stamps, paths = [], []
+    for where, (stamp, name) in text_rows(folder / TUM_IMAGES, 'timestamp filename'):
+        try:
+            stamps.append(parse_stamp_ns(stamp))
+        except ValueError as error:
+            raise SequenceError(f'{where}: {error}') from None
+        paths.append(folder / name)
+        if not paths[-1].is_file():
+            raise SequenceError(f'{where}: there is no image {paths[-1]}')
+    if ground_truth is None and (folder / TUM_TRUTH).exists():
+        ground_truth = folder / TUM_TRUTH
+    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
+    return _sequence(folder, paths, stamps, trajectory)
+
+
+def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None) -> Sequence:
+    """
+    Open a folder of images in order of their names.
+
+    With ground truth and no rate, pose i belongs to image i and stamps it. With a rate, the
+    first image is taken with the first pose (or at 0), the others at this rate.
+    """
+    paths = images_in(folder)
+    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
+    if trajectory is not None and rate_hz is None:
+        if len(trajectory) != len(paths):
+            raise SequenceError(
+                f'{folder} holds {len(paths)} images, {ground_truth} {len(trajectory)} poses: '
+                'expected one pose per image, or the rate of the images in Hz')
+        return _sequence(folder, paths, trajectory.stamp_ns, trajectory)
+    start_ns = 0 if trajectory is None else int(trajectory.stamp_ns[0])
+    return _sequence(folder, paths, start_ns + _ticks(len(paths), rate_hz), trajectory)
+
+
+def walk_folders(folder: Path, walks: dict[Path, list[Path]],
+                 rate_hz: float | None) -> Sequence:
+    """
+    Open the walks along one path in the subfolders of a folder, one after the other.
+
+    Image i of each walk shows place i: the ground truth is by index, not in metres.
+    """
+    counts = {path.name: len(images) for path, images in walks.items()}
+    if len(set(counts.values())) != 1:
+        raise SequenceError(
+            f'the walks in {folder} have {", ".join(f"{n} ({k})" for k, n in counts.items())} '
+            'images: ground truth by index needs as many in each; import one walk by its own '
+            'folder')
+    count = next(iter(counts.values()))
+    ticks = _ticks(count, rate_hz)
+    period_ns = int(ticks[-1]) + round(WALK_GAP_S * 1e9)
+    stamps = np.concatenate([ticks + walk * period_ns for walk in range(len(walks))])
+    position = np.zeros((len(stamps), 3))
+    position[:, 0] = np.tile(np.arange(count), len(walks))
+    upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
+    paths = [path for images in walks.values() for path in images]
+    return _sequence(folder, paths, stamps, Trajectory(stamps, position, upright, PLACE_INDEX))
+
+
+def is_seven_scenes(folder: Path) -> bool:
+    """Tell whether a folder is a sequence of the 7-Scenes data set (frame-000000.color.png)."""
+    return any(folder.glob(f'frame-*{_SEVEN_SCENES_COLOUR}'))
+
+
+def seven_scenes(folder: Path, rate_hz: float | None) -> Sequence:
+    """Open a sequence of 7-Scenes: a 4 x 4 camera-to-world matrix beside each colour image."""
+    paths = sorted(folder.glob(f'frame-*{_SEVEN_SCENES_COLOUR}'))
+    poses = np.stack([_pose_matrix(
+        path.with_name(path.name.replace(_SEVEN_SCENES_COLOUR, '.pose.txt'))) for path in paths])
+    stamps = _ticks(len(paths), rate_hz)
+    quaternion = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    return _sequence(folder, paths, stamps, Trajectory(stamps, poses[:, :3, 3], quaternion))
+
+
+def _pose_matrix(path: Path) -> NDArray[np.float64]:
+    try:
+        matrix = np.array([[float(text) for text in fields]
+                           for _, fields in text_rows(path, 'r r r t')])
+    except ValueError as error:
+        raise SequenceError(f'{path}: {error}') from None
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise SequenceError(f'{path}: expected 4 rows of 4 finite numbers')
+    turn = matrix[:3, :3]
+    if (np.abs(turn @ turn.T - np.eye(3)).max() > _ORTHOGONAL_TOLERANCE
+            or np.linalg.det(turn) < 0):
+        raise SequenceError(f'{path}: the first 3 x 3 numbers are no rotation')
+    return matrix
+
+
+def _ticks(count: int, rate_hz: float | None) -> NDArray[np.int64]:
+    rate = DEFAULT_RATE_HZ if rate_hz is None else rate_hz
+    ticks: NDArray[np.int64] = np.round(np.arange(count) * (1e9 / rate)).astype(np.int64)
+    return ticks
+
+
+def _sequence(folder: Path, paths: list[Path], stamps: list[int] | NDArray[np.int64],
+              trajectory: Trajectory | None) -> Sequence:
+    if not paths:
+        raise SequenceError(f'{folder} holds no camera frame')
+    first = _open(paths[0], 0, None)
+    size = first.width, first.height
+    stamps_ns = np.asarray(stamps, np.int64)
+
+    def read() -> Iterator[Frame]:
+        for path, stamp_ns in zip(paths, stamps_ns, strict=True):
+            yield _open(path, int(stamp_ns), size)
+
+    return Sequence(folder.resolve().name, folder, stamps_ns, size, trajectory, read)
+
+
+def _open(path: Path, stamp_ns: int, size: tuple[int, int] | None) -> Frame:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SequenceError(f'image {path} cannot be read: {error}') from error
+    return open_compressed(stamp_ns, data, f'image {path}', size)

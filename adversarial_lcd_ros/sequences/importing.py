@@ -1,0 +1,113 @@
+"""Any sequence to a bag that every node, and every ROS 2 tool, can replay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+import heapq
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adversarial_lcd_ros.codec import typestore
+from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter, header
+from adversarial_lcd_ros.sequences.frame import Frame
+from adversarial_lcd_ros.sequences.opening import open_sequence
+from adversarial_lcd_ros.sequences.trajectory import Trajectory
+
+IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
+CAMERA_FRAME = 'camera'
+# Poses from so long before the first frame to so long after the last one are kept.
+_MARGIN_NS = 100_000_000
+
+
+@dataclass(frozen=True)
+class ImportSummary:
+    """What an import has written."""
+
+    path: Path
+    name: str
+    frames: int
+    poses: int
+    image_size: tuple[int, int]
+    duration_s: float
+    size_bytes: int
+
+
+def import_sequence(source: Path | str, destination: Path | str, *,
+                    progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
+                    topic: str | None = None, ground_truth: Path | str | None = None,
+                    rate_hz: float | None = None) -> ImportSummary:
+    """
+    Write a sequence as a rosbag2 in MCAP.
+
+    Frames become sensor_msgs/CompressedImage on /image/compressed: JPEG and PNG files with
+    their bytes untouched, raw images as JPEG of quality 95. Every frame is decoded once, as a
+    check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. The same source
+    always gives the same bytes.
+
+    Parameters
+    ----------
+    source, topic, ground_truth, rate_hz
+        See ``open_sequence``.
+    destination : Path or str
+        Folder of the bag; it appears when it is complete, or not at all.
+    progress : callable, optional
+        Called with (frames done, frames in all).
+    overwrite : bool
+        Replace a bag that is there.
+
+    Raises
+    ------
+    SequenceError
+        The source is missing, truncated, empty or out of order, a frame cannot be decoded or
+        is of another size, or the destination exists.
+
+    """
+    with BagWriter(Path(destination), overwrite=overwrite) as bag:
+        sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz)
+        poses = None if sequence.trajectory is None else sequence.trajectory.between(
+            int(sequence.stamps_ns[0]) - _MARGIN_NS, int(sequence.stamps_ns[-1]) + _MARGIN_NS)
+        frames = _counted(sequence.frames(), sequence.frame_count, progress)
+        # At the same time, the pose comes first: the key sorts by nothing else.
+        for message_topic, message_type, stamp_ns, cdr in heapq.merge(
+                _pose_messages(poses), map(_image_message, frames), key=lambda row: row[2]):
+            bag.write(message_topic, message_type, stamp_ns, cdr)
+    path = Path(destination)
+    return ImportSummary(
+        path, sequence.name, sequence.frame_count, 0 if poses is None else len(poses),
+        sequence.image_size, float(sequence.stamps_ns[-1] - sequence.stamps_ns[0]) / 1e9,
+        sum(file.stat().st_size for file in path.iterdir()))
+
+
+def _counted(frames: Iterator[Frame], total: int,
+             progress: Callable[[int, int], None] | None) -> Iterator[Frame]:
+    for done, frame in enumerate(frames, 1):
+        frame.image()
+        yield frame.jpeg()
+        if progress is not None:
+            progress(done, total)
+
+
+def _image_message(frame: Frame) -> tuple[str, str, int, bytes]:
+    types: Any = typestore().types
+    message = types[COMPRESSED_IMAGE](
+        header=header(frame.stamp_ns, CAMERA_FRAME), format=frame.encoding,
+        data=np.frombuffer(frame.data, np.uint8))
+    return (IMAGE_TOPIC, COMPRESSED_IMAGE, frame.stamp_ns,
+            bytes(typestore().serialize_cdr(message, COMPRESSED_IMAGE)))
+
+
+def _pose_messages(trajectory: Trajectory | None) -> Iterator[tuple[str, str, int, bytes]]:
+    if trajectory is None:
+        return
+    types: Any = typestore().types
+    point, quaternion, pose = (types[f'geometry_msgs/msg/{name}']
+                               for name in ('Point', 'Quaternion', 'Pose'))
+    for stamp_ns, place, turn in zip(trajectory.stamp_ns.tolist(), trajectory.position.tolist(),
+                                     trajectory.quaternion.tolist(), strict=True):
+        message = types[POSE](header=header(stamp_ns, trajectory.frame_id), pose=pose(
+            position=point(*place), orientation=quaternion(*turn)))
+        yield (GROUND_TRUTH_TOPIC, POSE, stamp_ns,
+               bytes(typestore().serialize_cdr(message, POSE)))

@@ -1,0 +1,95 @@
+"""Opening whatever a sequence was published as."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences import folders
+from adversarial_lcd_ros.sequences.bagfile import is_bag
+from adversarial_lcd_ros.sequences.bags import NO_TRUTH, bag_sequence
+from adversarial_lcd_ros.sequences.sequence import Sequence
+
+_LAYOUTS = ('a TUM RGB-D folder (rgb.txt), a folder of JPEG or PNG images, a folder of walks '
+            '(subfolders of images), a 7-Scenes sequence (frame-000000.color.png), a ROS 1 bag '
+            '(.bag) or a rosbag2 (folder, .mcap, .db3)')
+
+
+def open_sequence(path: Path | str, *, topic: str | None = None,
+                  ground_truth: Path | str | None = None,
+                  rate_hz: float | None = None) -> Sequence:
+    """
+    Open a sequence, whatever it was published as.
+
+    Parameters
+    ----------
+    path : Path or str
+        TUM RGB-D folder, folder of images, folder of walks along one path, 7-Scenes sequence,
+        ROS 1 bag or rosbag2.
+    topic : str, optional
+        Bags: the topic of the frames, where several hold camera images.
+    ground_truth : Path or str, optional
+        A file in TUM's form (``timestamp tx ty tz qx qy qz qw``); for bags also a topic of
+        geometry_msgs/PoseStamped; 'none': use none. By default what the source brings along.
+    rate_hz : float, optional
+        Sources without time stamps: frames per second, 30 unless given.
+
+    Returns
+    -------
+    Sequence
+
+    Raises
+    ------
+    SequenceError
+        The source is missing, unknown, truncated, empty or out of order, or an option does not
+        apply to it.
+
+    """
+    path = Path(path)
+    if not path.exists():
+        raise SequenceError(f'there is no sequence {path}')
+    if rate_hz is not None and not (math.isfinite(rate_hz) and 0 < rate_hz <= 1e6):
+        raise SequenceError(f'rate of {rate_hz} Hz: expected more than 0')
+    if path.is_dir() and (path / folders.TUM_IMAGES).is_file():
+        _refuse(path, topic=topic, rate_hz=rate_hz)
+        return _without_truth(folders.tum_folder(path, _file(ground_truth)), ground_truth)
+    if is_bag(path):
+        _refuse(path, rate_hz=rate_hz)
+        return bag_sequence(path, topic, ground_truth)
+    if not path.is_dir():
+        raise SequenceError(f'{path} is no sequence: expected {_LAYOUTS}; unpack an archive first')
+    _refuse(path, topic=topic)
+    return _image_folder(path, ground_truth, rate_hz)
+
+
+def _image_folder(path: Path, ground_truth: Path | str | None,
+                  rate_hz: float | None) -> Sequence:
+    if folders.is_seven_scenes(path):
+        _refuse(path, ground_truth=_file(ground_truth))
+        return _without_truth(folders.seven_scenes(path, rate_hz), ground_truth)
+    if folders.images_in(path):
+        return folders.image_folder(path, _file(ground_truth), rate_hz)
+    walks = folders.walks_in(path)
+    if walks:
+        _refuse(path, ground_truth=_file(ground_truth))
+        return _without_truth(folders.walk_folders(path, walks, rate_hz), ground_truth)
+    raise SequenceError(f'{path} holds no sequence: expected {_LAYOUTS}')
+
+
+def _file(ground_truth: Path | str | None) -> Path | None:
+    return None if ground_truth in (None, NO_TRUTH) else Path(str(ground_truth))
+
+
+def _without_truth(sequence: Sequence, ground_truth: Path | str | None) -> Sequence:
+    if ground_truth != NO_TRUTH:
+        return sequence
+    return Sequence(sequence.name, sequence.source, sequence.stamps_ns, sequence.image_size,
+                    None, sequence.read)
+
+
+def _refuse(path: Path, **options: object) -> None:
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise SequenceError(f'{" and ".join(given)} given, but {path} brings its own: leave it '
+                            'out')
