@@ -8,12 +8,14 @@ the stamps of a replay; ``BagRecorder`` keeps what comes of them; ``read_payload
 from __future__ import annotations
 
 from collections.abc import Iterator
+import heapq
 from pathlib import Path
 import threading
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.config import ReplayConfig
@@ -68,60 +70,65 @@ class Replay:
     ------
     SequenceError
         The bag is missing, truncated, out of order, or has no frames, or frames on several
-        topics; or start, duration and stride leave no frame.
+        topics, or is one of ROS 1; or start, duration and stride leave no frame.
 
     """
 
     def __init__(self, path: Path, config: ReplayConfig) -> None:
         self._path, self._config = Path(path), config
         with BagFile(self._path) as bag:
+            if bag.is_ros1:
+                raise SequenceError(f'{path} is a bag of ROS 1: make one of ROS 2 with '
+                                    '"adversarial-lcd import"')
             self._frame_topic = _frame_topic(bag)
-            others = bag.of_type(POSE)
-            self.topics = {topic: bag.topics[topic] for topic in (self._frame_topic, *others)}
+            self._pose_topics = bag.of_type(POSE)
+            self.topics = {topic: bag.topics[topic]
+                           for topic in (self._frame_topic, *self._pose_topics)}
             self.frame_topics = (self._frame_topic,)
-            self._stamps = check_order(
+            stamps = check_order(
                 [_stamp_ns(bag.topics[topic], wire)
                  for topic, _, wire in bag.messages([self._frame_topic])], self._path)
-        self._first_ns, self._last_ns = self._span()
-        self._kept = set(self._stamps[
-            (self._stamps >= self._first_ns) & (self._stamps <= self._last_ns)
-        ][::config.stride].tolist())
-        if not self._kept:
-            length_s = (self._stamps[-1] - self._stamps[0]) / 1e9
-            raise SequenceError(
-                f'no frame of {self._path} is left: it is {length_s:.3f} s long, and the replay '
-                f'is to start at {config.start_s:g} s')
+        self._select(stamps)
         self.frame_count = len(self._kept) * config.loop
 
-    def _span(self) -> tuple[int, int]:
-        first_ns = int(self._stamps[0]) + round(self._config.start_s * 1e9)
-        if not self._config.duration_s:
-            return first_ns, int(self._stamps[-1])
-        return first_ns, first_ns + round(self._config.duration_s * 1e9)
+    def _select(self, stamps: NDArray[np.int64]) -> None:
+        config = self._config
+        self._first_ns = int(stamps[0]) + round(config.start_s * 1e9)
+        self._end_ns = int(stamps[-1]) + 1
+        if config.duration_s:
+            self._end_ns = min(self._end_ns, self._first_ns + round(config.duration_s * 1e9))
+        kept = stamps[(stamps >= self._first_ns) & (stamps < self._end_ns)][::config.stride]
+        if not len(kept):
+            raise SequenceError(
+                f'no frame of {self._path} is left: it lasts {(stamps[-1] - stamps[0]) / 1e9:g} s,'
+                f' and {config.duration_s or "all"} s from {config.start_s:g} s on are asked for')
+        self._kept = set(kept.tolist())
+        gap_ns = int(np.median(np.diff(kept))) if len(kept) > 1 else 1_000_000_000
+        self._period_ns = self._end_ns - self._first_ns + gap_ns
 
     def __iter__(self) -> Iterator[tuple[str, str, int, bytes]]:
-        period_ns = self._period_ns()
         for loop in range(self._config.loop):
-            for topic, kind, stamp_ns, wire in self._once():
+            for topic, stamp_ns, wire in self._once():
+                kind = self.topics[topic]
                 if loop:
-                    stamp_ns += loop * period_ns
+                    stamp_ns += loop * self._period_ns
                     wire = _with_stamp(kind, wire, stamp_ns)
                 yield topic, kind, stamp_ns, wire
 
-    def _once(self) -> Iterator[tuple[str, str, int, bytes]]:
+    def _once(self) -> Iterator[tuple[str, int, bytes]]:
+        # Bags are in order of arrival, a replay in order of the stamps: /clock must not go back.
         with BagFile(self._path) as bag:
-            for topic, _, wire in bag.messages(list(self.topics)):
-                kind = self.topics[topic]
-                stamp_ns = _stamp_ns(kind, wire)
-                if (stamp_ns in self._kept if topic == self._frame_topic
-                        else self._first_ns <= stamp_ns <= self._last_ns):
-                    yield topic, kind, stamp_ns, wire
+            poses = [(topic, cdr_stamp_ns(wire), wire)
+                     for topic, _, wire in bag.messages(self._pose_topics)]
+            kept = (row for row in poses if self._first_ns <= row[1] < self._end_ns)
+            yield from heapq.merge(sorted(kept, key=lambda row: row[1]), self._frames(bag),
+                                   key=lambda row: row[1])
 
-    def _period_ns(self) -> int:
-        """Return the time from one loop to the next: the span and one frame more."""
-        frames = sorted(self._kept)
-        gap_ns = int(np.median(np.diff(frames))) if len(frames) > 1 else 1_000_000_000
-        return min(self._last_ns, int(self._stamps[-1])) - self._first_ns + gap_ns
+    def _frames(self, bag: BagFile) -> Iterator[tuple[str, int, bytes]]:
+        for topic, _, wire in bag.messages([self._frame_topic]):
+            stamp_ns = _stamp_ns(self.topics[topic], wire)
+            if stamp_ns in self._kept:
+                yield topic, stamp_ns, wire
 
 
 def _frame_topic(bag: BagFile) -> str:

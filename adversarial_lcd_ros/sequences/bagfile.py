@@ -83,6 +83,7 @@ class BagFile:
         Topic to message type (as in ROS 2: sensor_msgs/msg/Image).
     counts : dict of str to int
         Messages by topic, as the index of the bag says.
+    is_ros1 : bool
 
     Raises
     ------
@@ -95,10 +96,10 @@ class BagFile:
         self.path = path
         if not path.exists():
             raise SequenceError(f'there is no bag {path}')
-        self._is_ros1 = path.is_file() and path.suffix == ROS1_SUFFIX
-        self._types = _ros1_typestore() if self._is_ros1 else typestore()
+        self.is_ros1 = path.is_file() and path.suffix == ROS1_SUFFIX
+        self._types = _ros1_typestore() if self.is_ros1 else typestore()
         with _explained(path):
-            self._reader: Any = Reader1(path) if self._is_ros1 else Reader2(path)
+            self._reader: Any = Reader1(path) if self.is_ros1 else Reader2(path)
             self._reader.open()
         connections: Sequence[Connection] = self._reader.connections
         self.topics = {entry.topic: entry.msgtype for entry in connections}
@@ -144,12 +145,12 @@ class BagFile:
         """Return the message in the bytes of a topic; raises SequenceError."""
         kind = TF if self.topics[topic] in OLD_TF else self.topics[topic]
         with _explained(self.path):
-            return (self._types.deserialize_ros1(wire, kind) if self._is_ros1
+            return (self._types.deserialize_ros1(wire, kind) if self.is_ros1
                     else self._types.deserialize_cdr(wire, kind))
 
     def stamp_ns(self, wire: bytes) -> int:
         """Return the stamp of a message that starts with a header; raises SequenceError."""
-        if not self._is_ros1:
+        if not self.is_ros1:
             return cdr_stamp_ns(wire)
         if len(wire) < 12:
             raise SequenceError(f'bag {self.path}: a message of {len(wire)} bytes has no header')
@@ -233,12 +234,20 @@ class BagWriter:
                 topic, message_type, typestore=typestore())
         self._writer.write(connection, stamp_ns, cdr)
 
+    def attach(self, file: Path) -> None:
+        """Put a copy of a file beside the bag's own."""
+        shutil.copyfile(file, self._writer.path / file.name)
+
     def close(self) -> None:
-        """Complete the bag and move it to its place."""
-        self._writer.close()
-        if self._destination.exists():
-            self._destination.rename(self._folder / 'replaced')
-        (self._folder / self._destination.name).rename(self._destination)
+        """Complete the bag and move it to its place; where that fails, throw it away."""
+        try:
+            self._writer.close()
+            if self._destination.exists():
+                self._destination.rename(self._folder / 'replaced')
+            (self._folder / self._destination.name).rename(self._destination)
+        except BaseException:
+            self.abort()
+            raise
         shutil.rmtree(self._folder)
 
     def abort(self) -> None:
@@ -251,14 +260,10 @@ class BagWriter:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        if error is not None:
-            self.abort()
-            return
-        try:
+        if error is None:
             self.close()
-        except BaseException:
+        else:
             self.abort()
-            raise
 
 
 def _check_free(destination: Path, overwrite: bool) -> None:

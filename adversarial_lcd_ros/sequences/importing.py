@@ -20,6 +20,8 @@ IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
 CAMERA_FRAME = 'camera'
 # Poses from so long before the first frame to so long after the last one are kept.
 _MARGIN_NS = 100_000_000
+# Who made the pictures, and what one may do with them.
+_TERMS = ('credits', 'license', 'licence')
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,8 @@ def import_sequence(source: Path | str, destination: Path | str, *,
 
     Frames become sensor_msgs/CompressedImage on /image/compressed: JPEG and PNG files with
     their bytes untouched, raw images as JPEG of quality 95. Every frame is decoded once, as a
-    check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. The same source
-    always gives the same bytes.
+    check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. Credits and licence
+    files of a source folder go with the pictures. The same source always gives the same bytes.
 
     Parameters
     ----------
@@ -74,11 +76,20 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         for message_topic, message_type, stamp_ns, cdr in heapq.merge(
                 _pose_messages(poses), map(_image_message, frames), key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
+        for file in _terms(Path(source)):
+            bag.attach(file)
     path = Path(destination)
     return ImportSummary(
         path, sequence.name, sequence.frame_count, 0 if poses is None else len(poses),
         sequence.image_size, float(sequence.stamps_ns[-1] - sequence.stamps_ns[0]) / 1e9,
         sum(file.stat().st_size for file in path.iterdir()))
+
+
+def _terms(source: Path) -> list[Path]:
+    if not source.is_dir():
+        return []
+    return [path for path in sorted(source.iterdir())
+            if path.is_file() and path.stem.lower() in _TERMS]
 
 
 def _counted(frames: Iterator[Frame], total: int,
