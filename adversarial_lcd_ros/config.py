@@ -125,7 +125,7 @@ class LcdConfig(Config):
     target: str = setting('wl', 'How two graphs are compared.', choices=TARGETS)
     model: str = setting('', 'Trained target (JSON); empty: the one that ships.')
     candidates: int = setting(
-        8, 'Keyframes that vBoW retrieves for the graph to decide on.', low=1, high=1000)
+        5, 'Keyframes that vBoW retrieves for the graph to decide on.', low=1, high=1000)
     min_gap_s: float = setting(
         8.0, 'Keyframes younger than this are no candidates, seconds.', low=0.0, high=1e6)
     map_window: int = setting(

@@ -17,7 +17,7 @@ from adversarial_lcd_ros.keyframes import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
-from adversarial_lcd_ros.lcd.views import View, match_nodes
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),
                         *((k, k + 1) for k in range(2, 39))], objects=2)
@@ -35,9 +35,9 @@ def model(tmp_path):
 
 
 def scores(target, query, reference):
-    a, b = View(query), View(reference)
-    return dict(zip(TARGETS[target].channels,
-                    make_target(target).compare(a, b, match_nodes(a, b)), strict=True))
+    view = View(query)
+    found, = make_target(target).compare(view, Comparison(view, [View(reference)]))
+    return dict(zip(TARGETS[target].channels, found, strict=True))
 
 
 def test_a_graph_is_most_like_itself():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.targets import make_target
-from adversarial_lcd_ros.lcd.views import NodeMatch, View, match_nodes
+from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
 
 CACHED_VIEWS = 256
@@ -27,9 +27,10 @@ class _QueryNodes:
 
     key: tuple[object, ...]
     x0: NDArray[np.float32]
+    bow: NDArray[np.float64]
     candidates: list[int]
-    scores: NDArray[np.float64]
-    matches: dict[int, NodeMatch] = field(default_factory=dict)
+    windows: list[NDArray[np.int64]]
+    comparison: Comparison
 
 
 class LoopClosureDetector:
@@ -77,7 +78,8 @@ class LoopClosureDetector:
         if not nodes.candidates:
             return LoopClosure(graph.stamp_ns, graph.frame_id, graph.sequence,
                                is_loop=False, probability=0.0)
-        logit = self._candidate_logits(View(graph, nodes.x0), nodes)
+        scores = self._target.compare(View(graph, nodes.x0), nodes.comparison)
+        logit = self._decision.logit([scores[rows].mean(axis=0) for rows in nodes.windows])
         best = int(logit.argmax())
         keyframe = nodes.candidates[best]
         chance = probability(float(logit[best]))
@@ -86,23 +88,33 @@ class LoopClosureDetector:
             graph.stamp_ns, graph.frame_id, graph.sequence,
             is_loop=chance >= self.config.threshold, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
-            vbow_score=float(nodes.scores[keyframe]), candidates=len(nodes.candidates))
+            vbow_score=float(nodes.bow[keyframe]), candidates=len(nodes.candidates))
 
     def _query_nodes(self, graph: MultiTierGraph) -> _QueryNodes:
         key = (graph.node_digest, graph.word.tobytes(), graph.word_weight.tobytes(),
                graph.stamp_ns, len(self._database))
         if self._latest is None or self._latest.key != key:
-            scores = self._database.scores(graph)
-            self._latest = _QueryNodes(key, View(graph).x0, self._retrieve(graph, scores), scores)
+            self._latest = self._compare_nodes(graph, key)
         return self._latest
 
-    def _retrieve(self, graph: MultiTierGraph, scores: NDArray[np.float64]) -> list[int]:
+    def _compare_nodes(self, graph: MultiTierGraph, key: tuple[object, ...]) -> _QueryNodes:
+        old = self._database.admissible(graph.stamp_ns, round(self.config.min_gap_s * 1e9))
+        bow = self._database.scores(graph)
+        candidates = self._retrieve(bow, old)
+        around = [self._window(candidate, old) for candidate in candidates]
+        keyframes = sorted({keyframe for window in around for keyframe in window})
+        rows = {keyframe: row for row, keyframe in enumerate(keyframes)}
+        query = View(graph)
+        return _QueryNodes(key, query.x0, bow, candidates,
+                           [np.array([rows[keyframe] for keyframe in window])
+                            for window in around],
+                           Comparison(query, [self._view(keyframe) for keyframe in keyframes]))
+
+    def _retrieve(self, bow: NDArray[np.float64], old: NDArray[np.bool_]) -> list[int]:
         """Return keyframes by falling vBoW score, none in another's map window."""
-        old = self._admissible(graph)
-        order = np.flatnonzero(old)[np.argsort(-scores[old], kind='stable')]
-        taken = np.zeros(len(scores), bool)
+        taken = ~old
         chosen: list[int] = []
-        for keyframe in order:
+        for keyframe in np.argsort(-bow, kind='stable'):
             if not taken[keyframe]:
                 chosen.append(int(keyframe))
                 taken[max(0, keyframe - self.config.map_window):
@@ -111,27 +123,8 @@ class LoopClosureDetector:
                     break
         return chosen
 
-    def _admissible(self, graph: MultiTierGraph) -> NDArray[np.bool_]:
-        return self._database.admissible(graph.stamp_ns, round(self.config.min_gap_s * 1e9))
-
-    def _candidate_logits(self, query: View, nodes: _QueryNodes) -> NDArray[np.float64]:
-        old = self._admissible(query.graph)
-        window = np.arange(-self.config.map_window, self.config.map_window + 1)
-        scores: dict[int, NDArray[np.float64]] = {}
-        logits = np.zeros(len(nodes.candidates))
-        for place, candidate in enumerate(nodes.candidates):
-            around = candidate + window
-            around = around[(around >= 0) & (around < len(old))]
-            around = around[old[around]]
-            for keyframe in map(int, around):
-                if keyframe not in scores:
-                    scores[keyframe] = self._compare(query, keyframe, nodes)
-            mean = np.mean([scores[int(keyframe)] for keyframe in around], axis=0)
-            logits[place] = self._decision.logit(mean)
-        return logits
-
-    def _compare(self, query: View, keyframe: int, nodes: _QueryNodes) -> NDArray[np.float64]:
-        reference = self._view(keyframe)
-        if keyframe not in nodes.matches:
-            nodes.matches[keyframe] = match_nodes(query, reference)
-        return self._target.compare(query, reference, nodes.matches[keyframe])
+    def _window(self, candidate: int, old: NDArray[np.bool_]) -> list[int]:
+        """Return the candidate and the keyframes around it that are old enough, too."""
+        window = range(max(0, candidate - self.config.map_window),
+                       min(len(old), candidate + self.config.map_window + 1))
+        return [keyframe for keyframe in window if old[keyframe]]

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes import Database
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets import Target, make_target
-from adversarial_lcd_ros.lcd.views import View, match_nodes
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 Progress = Callable[[int, int], None]
 
@@ -60,10 +60,9 @@ class PairScorer:
 
     def scores(self, query: View, reference: int) -> NDArray[np.float64]:
         """Return the mean scores of a query with a reference's window, shape (channels,)."""
-        rows = [self._target.compare(query, self._views[frame],
-                                     match_nodes(query, self._views[frame]))
-                for frame in self.references(reference)]
-        mean: NDArray[np.float64] = np.mean(rows, axis=0)
+        views = [self._views[frame] for frame in self.references(reference)]
+        mean: NDArray[np.float64] = self._target.compare(
+            query, Comparison(query, views)).mean(axis=0)
         return mean
 
     def pairs(self, pairs: LabelledPairs, progress: Progress | None = None

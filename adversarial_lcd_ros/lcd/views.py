@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,18 +81,11 @@ class View:
         rows: NDArray[np.float32] = mixed / np.maximum(norm, np.float32(1e-12))[:, None]
         return rows
 
-    @cached_property
-    def degree(self) -> NDArray[np.int64]:
-        """Number of edges at each node, shape (n,)."""
-        return np.bincount(self.graph.edge.ravel(), minlength=self.graph.node_count)
-
 
 @dataclass(frozen=True)
 class NodeMatch:
     """
     Features of a query and of a reference that are each other's nearest neighbour.
-
-    It depends on nodes only: edge flips leave it alone.
 
     Attributes
     ----------
@@ -98,35 +93,113 @@ class NodeMatch:
         Node indices.
     weight : float32, (k,)
         sqrt(cosine - 0.4), only pairs above that cosine.
-    partner : int64, (n_query,)
-        Reference node of each query node, -1 without one.
-    partner_weight : float32, (n_query,)
-        Its weight, 0 without one.
 
     """
 
     query: NDArray[np.int64]
     reference: NDArray[np.int64]
     weight: NDArray[np.float32]
-    partner: NDArray[np.int64]
-    partner_weight: NDArray[np.float32]
 
 
 def match_nodes(query: View, reference: View) -> NodeMatch:
     """Return the mutual nearest neighbours between the features of two graphs."""
-    partner = np.full(query.graph.node_count, -1, np.int64)
-    partner_weight = np.zeros(query.graph.node_count, np.float32)
     if not query.features or not reference.features:
         none = np.zeros(0, np.int64)
-        return NodeMatch(none, none, np.zeros(0, np.float32), partner, partner_weight)
+        return NodeMatch(none, none, np.zeros(0, np.float32))
     cosine = query.x0[query.objects:] @ reference.x0[reference.objects:].T
     forward, backward = cosine.argmax(axis=1), cosine.argmax(axis=0)
     rows = np.arange(query.features)
     best = cosine[rows, forward]
     kept = np.flatnonzero((backward[forward] == rows) & (best > MIN_COSINE))
-    weight = np.sqrt(best[kept] - np.float32(MIN_COSINE))
-    ends = kept + query.objects, forward[kept] + reference.objects
-    partner[ends[0]] = ends[1]
-    partner_weight[ends[0]] = weight
-    return NodeMatch(*ends, weight, partner, partner_weight)
+    return NodeMatch(kept + query.objects, forward[kept] + reference.objects,
+                     np.sqrt(best[kept] - np.float32(MIN_COSINE)))
 
+
+class Comparison:
+    """
+    A query's nodes beside several references: all that edge flips of the query leave alone.
+
+    An attack asks about the same nodes hundreds of times. What is kept here is laid out for
+    that: one flat array over all references, ``*_owner`` telling whose a row is.
+
+    Attributes
+    ----------
+    references : list of View
+    matches : list of NodeMatch
+    features, objects, edges : int64, (r,)
+        Numbers of each reference.
+
+    """
+
+    def __init__(self, query: View, references: Sequence[View]) -> None:
+        self.references = list(references)
+        self.matches = [match_nodes(query, reference) for reference in references]
+        self.features = np.array([view.features for view in references], np.int64)
+        self.objects = np.array([view.objects for view in references], np.int64)
+        self.edges = np.array([view.graph.edge_count for view in references], np.int64)
+        self._query_nodes = query.graph.node_count
+
+    def __len__(self) -> int:
+        """Return the number of references, r."""
+        return len(self.references)
+
+    def total(self, owner: NDArray[np.int64], value: NDArray[np.floating[Any]]
+              ) -> NDArray[np.float64]:
+        """Return the sum of the values of each reference, shape (r,)."""
+        sums: NDArray[Any] = np.bincount(owner, value, minlength=len(self))
+        return sums.astype(np.float64)
+
+    @cached_property
+    def match_owner(self) -> NDArray[np.int64]:
+        """Reference of each matched feature, shape (k,)."""
+        return np.repeat(np.arange(len(self)), [len(match.query) for match in self.matches])
+
+    @cached_property
+    def match_query(self) -> NDArray[np.int64]:
+        """Query node of each matched feature, shape (k,)."""
+        return np.concatenate([match.query for match in self.matches])
+
+    @cached_property
+    def match_weight(self) -> NDArray[np.float32]:
+        """Weight of each matched feature, shape (k,)."""
+        return np.concatenate([match.weight for match in self.matches])
+
+    @cached_property
+    def match_x1(self) -> NDArray[np.float32]:
+        """Reference's features after one WL iteration, of each matched feature, (k, 256)."""
+        return np.concatenate([view.x1[match.reference] for view, match
+                               in zip(self.references, self.matches, strict=True)])
+
+    @cached_property
+    def object_x1(self) -> NDArray[np.float32]:
+        """Reference's objects after one WL iteration, shape (sum of objects, 256)."""
+        return np.concatenate([view.x1[:view.objects] for view in self.references])
+
+    @cached_property
+    def _credit(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+        keys, weights, owners = [], [], []
+        for owner, (view, match) in enumerate(zip(self.references, self.matches, strict=True)):
+            node = np.full(view.graph.node_count, -1, np.int64)
+            weight = np.zeros(view.graph.node_count)
+            node[match.reference], weight[match.reference] = match.query, match.weight
+            u, v = node[view.graph.edge[:, 0]], node[view.graph.edge[:, 1]]
+            both = (u >= 0) & (v >= 0)
+            keys.append((np.minimum(u, v) * self._query_nodes + np.maximum(u, v))[both])
+            weights.append((weight[view.graph.edge[:, 0]] * weight[view.graph.edge[:, 1]])[both])
+            owners.append(np.full(len(keys[-1]), owner))
+        return np.concatenate(keys), np.concatenate(weights), np.concatenate(owners)
+
+    @property
+    def credit_key(self) -> NDArray[np.int64]:
+        """Query pairs, as source * n + target, whose matches a reference joins, (c,)."""
+        return self._credit[0]
+
+    @property
+    def credit_weight(self) -> NDArray[np.float64]:
+        """w_u w_v of each such pair: what the query earns by having that edge, (c,)."""
+        return self._credit[1]
+
+    @property
+    def credit_owner(self) -> NDArray[np.int64]:
+        """Reference of each such pair, shape (c,)."""
+        return self._credit[2]

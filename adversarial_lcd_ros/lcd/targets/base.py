@@ -7,7 +7,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.views import NodeMatch, View
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
 class Target(Protocol):
@@ -26,15 +26,16 @@ class Target(Protocol):
     name: ClassVar[str]
     channels: ClassVar[tuple[str, ...]]
 
-    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
+    def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """
-        Return the scores of a pair, shape (len(channels),).
+        Return the scores of a query with every reference, shape (r, channels).
 
         Parameters
         ----------
-        query, reference : View
-        match : NodeMatch
-            Of the two graphs' features; computed once for all flips of a query.
+        query : View
+            Its edges may differ from those of the graph that ``nodes`` was made of.
+        nodes : Comparison
+            The query's nodes beside r references.
 
         """
         ...

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.targets.scores import node_score
-from adversarial_lcd_ros.lcd.views import NodeMatch, View
+from adversarial_lcd_ros.lcd.targets.scores import descriptor_score
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
 class DescriptorsTarget:
@@ -17,6 +17,6 @@ class DescriptorsTarget:
     name: ClassVar[str] = 'descriptors'
     channels: ClassVar[tuple[str, ...]] = ('features',)
 
-    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
-        """Return the soft sum of matched features of a pair."""
-        return np.array([node_score(query, reference, match, iteration=0)])
+    def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
+        """Return the scores of a query with every reference, shape (r, 1)."""
+        return np.stack([descriptor_score(query, nodes)], axis=1)

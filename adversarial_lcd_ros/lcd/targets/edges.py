@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.lcd.targets.scores import edge_score
-from adversarial_lcd_ros.lcd.views import NodeMatch, View
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
 class EdgesTarget:
@@ -17,6 +17,6 @@ class EdgesTarget:
     name: ClassVar[str] = 'edges'
     channels: ClassVar[tuple[str, ...]] = ('edges',)
 
-    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
-        """Return the edge score of a pair."""
-        return np.array([edge_score(query, reference, match)])
+    def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
+        """Return the scores of a query with every reference, shape (r, 1)."""
+        return np.stack([edge_score(query, nodes)], axis=1)

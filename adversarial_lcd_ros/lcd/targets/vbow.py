@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.keyframes import bow_score
-from adversarial_lcd_ros.lcd.views import NodeMatch, View
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
 class VbowTarget:
@@ -17,6 +17,6 @@ class VbowTarget:
     name: ClassVar[str] = 'vbow'
     channels: ClassVar[tuple[str, ...]] = ('words',)
 
-    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
-        """Return the DBoW L1 score of a pair."""
-        return np.array([bow_score(query.graph, reference.graph)])
+    def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
+        """Return the DBoW L1 score of a query with every reference, shape (r, 1)."""
+        return np.array([[bow_score(query.graph, view.graph)] for view in nodes.references])

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.targets.scores import edge_score, node_score, object_score
-from adversarial_lcd_ros.lcd.views import NodeMatch, View
+from adversarial_lcd_ros.lcd.targets.scores import edge_score, neighbourhood_score, object_score
+from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
 class WlTarget:
@@ -17,8 +17,7 @@ class WlTarget:
     name: ClassVar[str] = 'wl'
     channels: ClassVar[tuple[str, ...]] = ('edges', 'features', 'objects')
 
-    def compare(self, query: View, reference: View, match: NodeMatch) -> NDArray[np.float64]:
-        """Return the scores (edges, features, objects) of a pair."""
-        return np.array([edge_score(query, reference, match),
-                         node_score(query, reference, match, iteration=1),
-                         object_score(query, reference)])
+    def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
+        """Return the scores of a query with every reference, shape (r, 3)."""
+        return np.stack([edge_score(query, nodes), neighbourhood_score(query, nodes),
+                         object_score(query, nodes)], axis=1)
