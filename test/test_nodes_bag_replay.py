@@ -1,0 +1,194 @@
+"""The node bag_replay: byte for byte, nothing lost in lockstep, honest about what is missing."""
+
+import cv2
+from graph_factory import make_graph
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.replay import read_payloads
+
+pytest.importorskip('rclpy', reason='rclpy is not installed')
+
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import UInt8MultiArray
+
+from adversarial_lcd_ros.nodes.attacker import AttackerNode
+from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
+from adversarial_lcd_ros.nodes.graph_builder import GraphBuilderNode
+from adversarial_lcd_ros.nodes.lcd import LcdNode
+from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+
+PERIOD_NS, FRAMES = 200_000_000, 15
+STAMPS = [5_000_000_000 + k * PERIOD_NS for k in range(FRAMES)]
+TYPE = 'sensor_msgs/msg/CompressedImage'
+
+
+def frame(stamp_ns, data):
+    store = codec.typestore()
+    types = store.types
+    header = types['std_msgs/msg/Header'](
+        types['builtin_interfaces/msg/Time'](*divmod(stamp_ns, 10**9)), 'camera')
+    return bytes(store.serialize_cdr(types[TYPE](header, 'jpeg', data), TYPE))
+
+
+@pytest.fixture
+def frames():
+    """Return the CDR of every frame of the bag: the same five views three times."""
+    coarse = np.random.default_rng(3).integers(0, 256, (5, 15, 20, 3)).astype(np.uint8)
+    views = [cv2.resize(view, (160, 120), interpolation=cv2.INTER_CUBIC) for view in coarse]
+    jpeg = [cv2.imencode('.jpg', view)[1].ravel() for view in views]
+    return [frame(stamp, jpeg[k % 5]) for k, stamp in enumerate(STAMPS)]
+
+
+@pytest.fixture
+def bag(tmp_path, frames):
+    path = tmp_path / 'bag'
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        images = writer.add_connection('/image/compressed', TYPE, typestore=codec.typestore())
+        for stamp, cdr in zip(STAMPS, frames, strict=True):
+            writer.write(images, stamp, cdr)
+    return str(path)
+
+
+class Pipeline:
+    """Builder and detector, with or without the man in the middle."""
+
+    def __init__(self, ros, vocabulary, lcd_model, attack=None):
+        self.lcd = ros.start(LcdNode, model=lcd_model, min_gap_s=1)
+        remaps = ['graph:=graph_clean'] if attack else []
+        self.builder = ros.start(GraphBuilderNode, *remaps, detector='none',
+                                 vocabulary=vocabulary, features=60)
+        self.attacker = ros.start(AttackerNode, **attack) if attack else None
+
+
+@pytest.fixture
+def pipeline(ros, vocabulary, lcd_model):
+    return Pipeline(ros, vocabulary, lcd_model)
+
+
+def replay(ros, bag, **parameters):
+    return ros.start(BagReplayNode, bag=bag, **({'timeout_s': 10} | parameters))
+
+
+@pytest.mark.parametrize('window', [1, 4])
+def test_lockstep_loses_nothing(ros, bag, pipeline, capsys, window):
+    node = replay(ros, bag, lockstep=True, window=window)
+    assert node.work(ros.spin) == 0
+    assert f'{FRAMES} frames, {FRAMES} decisions' in capsys.readouterr().out
+    assert pipeline.builder.diagnostics['published graphs'] == FRAMES
+    assert pipeline.lcd.detector.keyframe_count == FRAMES
+    assert pipeline.lcd.diagnostics['loops declared'] > 0
+
+
+def test_a_recording_holds_every_graph_decision_and_report(ros, bag, vocabulary, lcd_model,
+                                                           tmp_path):
+    pipeline = Pipeline(ros, vocabulary, lcd_model, {'ratio': 0.001, 'queries_per_edit': 3})
+    node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'))
+    assert node.work(ros.spin) == 0
+    ros.stop(node)
+    readers = {'graph_clean': codec.decode_graph, 'graph': codec.decode_graph,
+               'loop_closures': codec.decode_loop_closure,
+               'attack_report': codec.decode_attack_report}
+    records = {topic: [read(payload) for _, payload in read_payloads(tmp_path / 'record', topic)]
+               for topic, read in readers.items()}
+    for items in records.values():
+        assert [item.stamp_ns for item in items] == STAMPS
+    for clean, attacked, report in zip(records['graph_clean'], records['graph'],
+                                       records['attack_report'], strict=True):
+        assert len(clean.flips_to(attacked)) == report.edits
+    assert sum(report.queries for report in records['attack_report']) == (
+        pipeline.attacker.diagnostics['published queries'])
+
+
+def test_messages_are_published_byte_for_byte_with_clock(ros, bag, frames):
+    heard = ros.collect('image/compressed', bytes, CompressedImage)
+    clock = ros.collect('/clock', lambda m: m.clock.sec * 10**9 + m.clock.nanosec, Clock,
+                        raw=False)
+    node = replay(ros, bag, rate=20)
+    assert node.work(ros.spin) == 0
+    ros.until(lambda: len(heard) == FRAMES and STAMPS[-1] in clock)
+    assert heard == frames
+    assert clock == sorted(clock)
+    assert set(STAMPS) <= set(clock)
+
+
+def test_topics_can_be_remapped_and_clock_left_out(ros, bag, frames):
+    heard = ros.collect('front/image', bytes, CompressedImage)
+    clock = ros.collect('/clock', lambda m: m, Clock, raw=False)
+    node = ros.start(BagReplayNode, 'image/compressed:=front/image', bag=bag, clock=False,
+                     rate=100, timeout_s=10)
+    assert node.work(ros.spin) == 0
+    ros.until(lambda: heard == frames)
+    assert not clock
+
+
+def test_without_a_subscriber_the_replay_fails(ros, bag):
+    node = replay(ros, bag, timeout_s=0.3)
+    with pytest.raises(EvaluationError, match='no subscriber of /image/compressed'):
+        node.work(ros.spin)
+
+
+def test_lockstep_without_a_detector_fails(ros, bag, vocabulary):
+    ros.start(GraphBuilderNode, detector='none', vocabulary=vocabulary)
+    node = replay(ros, bag, lockstep=True, timeout_s=0.5)
+    with pytest.raises(EvaluationError, match='no publisher of /loop_closures'):
+        node.work(ros.spin)
+
+
+def test_a_missing_decision_is_named_by_its_stamp(ros, bag, tmp_path):
+    """Somebody takes the frames and decides on all but the fourth."""
+    decisions = ros.publisher('loop_closures')
+
+    def decide(message):
+        stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        if stamp_ns != STAMPS[3]:
+            decisions.publish(wrap(codec.encode_loop_closure(
+                codec.LoopClosure(stamp_ns, 'camera', 0, False, 0.0))))
+
+    ros.collect('image/compressed', decide, CompressedImage, raw=False)
+    record = tmp_path / 'record'
+    node = replay(ros, bag, lockstep=True, timeout_s=1.0, record=str(record))
+    with pytest.raises(EvaluationError, match=f'{STAMPS[3]} ns .*4 frames published, 3 decided'):
+        node.work(ros.spin)
+    assert not record.exists()  # a recording that looks whole is whole
+
+
+def test_damaged_decisions_are_counted_and_survived(ros, bag, pipeline):
+    node = replay(ros, bag, lockstep=True)
+    stray = ros.publisher('loop_closures')
+    ros.matched(stray)
+    stray.publish(b'junk')
+    assert node.work(ros.spin) == 0
+    assert node.diagnostics['refused loop closure'] == 1
+
+
+def test_a_bag_of_graphs_is_replayed_too(ros, tmp_path, lcd_model):
+    path = tmp_path / 'graphs'
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        graphs = writer.add_connection('/graph', 'std_msgs/msg/UInt8MultiArray',
+                                       typestore=codec.typestore())
+        for k, stamp in enumerate(STAMPS):
+            writer.write(graphs, stamp, wrap(codec.encode_graph(make_graph(
+                stamp_ns=stamp, sequence=k))))
+    lcd = ros.start(LcdNode, model=lcd_model)
+    heard = ros.collect('graph', lambda wire: codec.decode_graph(unwrap(wire)), UInt8MultiArray)
+    node = replay(ros, str(path), lockstep=True)
+    assert node.work(ros.spin) == 0
+    assert lcd.detector.keyframe_count == FRAMES
+    ros.until(lambda: [graph.stamp_ns for graph in heard] == STAMPS)
+
+
+def test_stopping_ends_the_replay_with_exit_code_0(ros, bag, pipeline):
+    node = replay(ros, bag, rate=0.01)
+    turns = iter(range(60))
+    assert node.work(lambda seconds: ros.spin(min(seconds, 0.01)) and next(turns, None) is not None
+                     ) == 0
+
+
+def test_a_missing_bag_is_an_error(ros, tmp_path):
+    with pytest.raises(SequenceError, match='nowhere'):
+        replay(ros, str(tmp_path / 'nowhere'))
