@@ -43,16 +43,12 @@ sys.exit(main())
 def shared_files():
     """Return data_files: every file below the shared folders keeps its place in share/."""
     share = Path('share', PACKAGE)
-    files = [('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
-             (str(share), ['package.xml'])]
-    for top in SHARED_FOLDERS:
-        folders = [Path(top), *sorted(p for p in Path(top).rglob('*') if p.is_dir())]
-        for folder in folders:
-            names = sorted(str(p) for p in folder.iterdir()
-                           if p.is_file() and p.suffix != '.pyc')
-            if names:
-                files.append((str(share / folder), names))
-    return files
+    files = {'share/ament_index/resource_index/packages': [f'resource/{PACKAGE}'],
+             str(share): ['package.xml']}
+    for path in sorted(path for top in SHARED_FOLDERS for path in Path(top).rglob('*')):
+        if path.is_file() and path.suffix != '.pyc':
+            files.setdefault(str(share / path.parent), []).append(str(path))
+    return list(files.items())
 
 
 def write_wrappers(folder):
@@ -78,4 +74,5 @@ if bdist_wheel is not None:
 
     commands['bdist_wheel'] = WheelWithExecutables
 
-setup(data_files=shared_files(), cmdclass=commands)
+# colcon cannot read python_requires from setup.cfg.
+setup(python_requires='>=3.10', data_files=shared_files(), cmdclass=commands)

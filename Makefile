@@ -1,0 +1,65 @@
+# make demo: attack loop closure detection on the embedded tour; report in results/latest
+# make test, make lint, make bench, make clean
+#
+# The first target sets up .venv and the object model; after that nothing is downloaded or built.
+# ARGS are passed on: make demo ARGS='--ratio 1e-4'; make test ARGS='-k codec'
+
+PYTHON ?= python3
+ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+BENCHABLE := $(VENV)/.benchable
+NODES := attacker bag_replay graph_builder lcd
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+# Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.PHONY: demo test lint bench clean setup model
+.DEFAULT_GOAL := demo
+
+demo: model
+	$(BIN)/adversarial-lcd demo $(ARGS)
+
+test: model
+	$(BIN)/python -m pytest -n 2 $(ARGS)
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+bench: model $(BENCHABLE)
+	$(BIN)/python -m pytest benchmarks $(ARGS)
+
+setup: model
+
+model: $(INSTALLED)
+	@$(BIN)/adversarial-lcd fetch-model >/dev/null
+
+# With ROS 2 sourced its own rclpy is used; otherwise PyPI's wheels of ROS 2 Jazzy are.
+# The links are what "pip install ." and colcon make: executables where "ros2 run" looks.
+$(INSTALLED): setup.py setup.cfg pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	  { echo 'error: $(PYTHON) is older than Python 3.10; make PYTHON=python3.12' >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+	  { echo 'error: $(PYTHON) has no venv; on Debian and Ubuntu: sudo apt install python3-venv' >&2; exit 1; }
+	@echo 'setting up $(VENV) (some minutes, once)'
+	@rm -rf $(VENV)
+	@if $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
+	  $(PYTHON) -m venv --system-site-packages $(VENV); else $(PYTHON) -m venv $(VENV); fi
+	@extras=test,dev; $(BIN)/python -c 'import rclpy' 2>/dev/null || extras=ros,$$extras; \
+	  $(PIP) install -e ".[$$extras]"
+	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
+	@for node in $(NODES); do \
+	  ln -sf ../../bin/$$node $(VENV)/lib/adversarial_lcd_ros/$$node; done
+	@touch $@
+
+$(BENCHABLE): $(INSTALLED)
+	@$(PIP) install -e '.[bench]'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache \
+	  .hypothesis .benchmarks
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
