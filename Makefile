@@ -11,7 +11,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
 NODES := attacker bag_replay graph_builder lcd
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE

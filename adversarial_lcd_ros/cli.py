@@ -89,17 +89,28 @@ def _tell(text: str) -> None:
 
 def _add_import(commands: _SubParsersAction[ArgumentParser]) -> None:
     parser = _add(commands, 'import', 'Turn a recorded sequence into a bag.', _import)
-    parser.add_argument('source', type=Path, help='TUM folder, ROS 1 bag, rosbag2, or a folder '
-                        'of images')
+    parser.add_argument('source', type=Path, help='TUM RGB-D folder, folder of images or of '
+                        'walks, 7-Scenes sequence, ROS 1 bag, or rosbag2')
     parser.add_argument('destination', type=Path, help='bag to write (rosbag2, MCAP)')
+    parser.add_argument('--topic', help='bags: topic of the frames, where several hold images')
+    parser.add_argument('--ground-truth', metavar='FILE', help='poses in the form of TUM; for '
+                        'bags also a topic of PoseStamped; none: use none (default: what the '
+                        'source brings along)')
+    parser.add_argument('--rate-hz', type=float, metavar='X', help='sources without time stamps: '
+                        'frames per second (default: 30)')
+    parser.add_argument('--overwrite', action='store_true', help='replace a bag that is there')
 
 
 def _import(options: Namespace) -> None:
     from adversarial_lcd_ros.sequences import import_sequence
 
     with progress_bar(f'importing {options.source.name}') as progress:
-        import_sequence(options.source, options.destination, progress=progress)
-    print(options.destination)
+        done = import_sequence(
+            options.source, options.destination, progress=progress, overwrite=options.overwrite,
+            topic=options.topic, ground_truth=options.ground_truth, rate_hz=options.rate_hz)
+    width, height = done.image_size
+    print(f'{done.path}: {done.frames} frames of {width} x {height} pixels, {done.poses} poses, '
+          f'{done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
 
 
 # evaluate, demo, report --------------------------------------------------------------------
@@ -208,12 +219,13 @@ def _add_inspect(commands: _SubParsersAction[ArgumentParser]) -> None:
 
 
 def _inspect(options: Namespace) -> None:
-    from adversarial_lcd_ros.inspection import inspect_bag, inspect_payload, is_bag
+    from adversarial_lcd_ros.inspection import inspect_bag, inspect_payload
+    from adversarial_lcd_ros.sequences.bagfile import is_bag
 
-    if is_bag(options.path) or not options.path.exists():
-        _show_bag(inspect_bag(options.path))
-    else:
+    if options.path.is_file() and not is_bag(options.path):
         _show_payload(*inspect_payload(options.path))
+    else:
+        _show_bag(inspect_bag(options.path))
 
 
 def _show_bag(bag: BagSummary) -> None:

@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.rosbag1 import ReaderError as Rosbag1Error
-from rosbags.rosbag2 import ReaderError as Rosbag2Error
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.errors import CodecError, SequenceError
+from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.sequences.bagfile import BagFile
 
 PAYLOAD_TYPE = 'std_msgs/msg/UInt8MultiArray'
-BAG_SUFFIXES = ('.bag', '.mcap', '.db3')
 _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
     'MultiTierGraph': codec.decode_graph,
     'LoopClosure': codec.decode_loop_closure,
@@ -82,11 +79,6 @@ class BagSummary:
     topics: tuple[TopicSummary, ...]
 
 
-def is_bag(path: Path) -> bool:
-    """Tell whether a path looks like a bag, and not like a payload."""
-    return path.is_dir() or path.suffix in BAG_SUFFIXES
-
-
 def inspect_bag(path: Path) -> BagSummary:
     """
     Return what is in a ROS 1 bag, a rosbag2 folder, or a single .mcap or .db3 file.
@@ -94,38 +86,30 @@ def inspect_bag(path: Path) -> BagSummary:
     Raises
     ------
     SequenceError
-        There is no such bag, or it is damaged.
+        There is no such bag, or it is truncated or damaged.
     CodecError
         A topic that starts with a graph goes on with something else.
 
     """
-    if not path.exists():
-        raise SequenceError(f'{path} does not exist: expected a bag')
-    try:
-        with AnyReader([path], default_typestore=codec.typestore()) as reader:
-            topics = tuple(_topic(reader, name) for name in sorted(reader.topics))
-            return BagSummary(path, reader.duration / 1e9 if reader.message_count else 0.0, topics)
-    except (AnyReaderError, Rosbag1Error, Rosbag2Error) as error:
-        raise SequenceError(f'{path} is no readable bag: {error}') from error
+    with BagFile(path) as bag:
+        return BagSummary(path, bag.duration_s,
+                          tuple(_topic(bag, name) for name in sorted(bag.topics)))
 
 
-def _topic(reader: AnyReader, name: str) -> TopicSummary:
-    info = reader.topics[name]
-    kind = str(info.msgtype)
-    if kind != PAYLOAD_TYPE or not info.msgcount:
-        return TopicSummary(name, kind, info.msgcount)
-    payload, _ = identify_payload(next(_payloads(reader, name)))
+def _topic(bag: BagFile, name: str) -> TopicSummary:
+    kind, count = bag.topics[name], bag.counts[name]
+    if kind != PAYLOAD_TYPE or not count:
+        return TopicSummary(name, kind, count)
+    payload, _ = identify_payload(next(_payloads(bag, name)))
     if payload != 'MultiTierGraph':
-        return TopicSummary(name, kind, info.msgcount, payload)
-    statistics = GraphStatistics.of(codec.decode_graph(data) for data in _payloads(reader, name))
-    return TopicSummary(name, kind, info.msgcount, payload, statistics)
+        return TopicSummary(name, kind, count, payload)
+    statistics = GraphStatistics.of(codec.decode_graph(data) for data in _payloads(bag, name))
+    return TopicSummary(name, kind, count, payload, statistics)
 
 
-def _payloads(reader: AnyReader, name: str) -> Iterator[bytes]:
-    connections = [c for c in reader.connections if c.topic == name]
-    for connection, _, raw in reader.messages(connections):
-        message: Any = reader.deserialize(raw, connection.msgtype)
-        yield message.data.tobytes()
+def _payloads(bag: BagFile, name: str) -> Iterator[bytes]:
+    for topic, _, wire in bag.messages([name]):
+        yield bag.decode(topic, wire).data.tobytes()
 
 
 def identify_payload(data: bytes) -> tuple[str, Any]:
@@ -152,7 +136,7 @@ def inspect_payload(path: Path) -> tuple[str, Any]:
         size = path.stat().st_size
         if size > codec.MAX_PAYLOAD_BYTES:
             raise CodecError(f'{path} has {size} bytes: a payload has at most '
-                             f'{codec.MAX_PAYLOAD_BYTES}; bags end in {", ".join(BAG_SUFFIXES)}')
+                             f'{codec.MAX_PAYLOAD_BYTES}')
         name, content = identify_payload(path.read_bytes())
     except OSError as error:
         raise CodecError(f'{path} cannot be read: {error.strerror}') from error

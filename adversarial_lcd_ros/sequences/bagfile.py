@@ -114,6 +114,11 @@ class BagFile:
                  trace: TracebackType | None) -> None:
         self._reader.close()
 
+    @property
+    def duration_s(self) -> float:
+        """Time from the first message to the last, seconds; 0 without messages."""
+        return float(self._reader.duration) / _NS if any(self.counts.values()) else 0.0
+
     def of_type(self, *types: str) -> list[str]:
         """Return the topics that hold messages of these types, sorted."""
         return sorted(topic for topic, kind in self.topics.items()
