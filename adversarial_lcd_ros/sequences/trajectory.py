@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+import math
 from pathlib import Path
 
 import numpy as np
@@ -207,9 +208,7 @@ def read_trajectory(path: Path) -> Trajectory:
             stamp_ns, values = parse_stamp_ns(fields[0]), [float(text) for text in fields[1:]]
         except ValueError as error:
             raise SequenceError(f'{where}: {error}') from None
-        if not np.isfinite(values).all():
-            raise SequenceError(f'{where}: the pose holds NaN or infinity; leave out what was '
-                                'not measured')
+        _check_pose(values, where)
         if stamps and stamp_ns < stamps[-1]:
             raise SequenceError(f'{where}: {fields[0]} s is earlier than the line before it; '
                                 'sort the file by time')
@@ -219,7 +218,14 @@ def read_trajectory(path: Path) -> Trajectory:
     if not stamps:
         raise SequenceError(f'{path} holds no pose: expected timestamp tx ty tz qx qy qz qw')
     array = np.asarray(poses)
-    try:
-        return Trajectory(np.asarray(stamps), array[:, :3], array[:, 3:])
-    except SequenceError as error:
-        raise SequenceError(f'{path}: {error}') from None
+    return Trajectory(np.asarray(stamps), array[:, :3], array[:, 3:])
+
+
+def _check_pose(values: list[float], where: str) -> None:
+    if not all(map(math.isfinite, values)):
+        raise SequenceError(f'{where}: the pose holds NaN or infinity; leave out what was not '
+                            'measured')
+    norm = math.hypot(*values[3:])
+    if abs(norm - 1) > _NORM_TOLERANCE:
+        raise SequenceError(f'{where}: quaternion of norm {norm:.4g}: expected 1, in the order '
+                            'qx qy qz qw')

@@ -38,7 +38,8 @@ def tf_trajectory(bag: BagFile, camera_frame: str) -> Trajectory | None:
     turn, position = Rotation.from_quat(first.quaternion), first.position.copy()
     for frame, link in zip(chain[1:], mount, strict=True):
         _check_still(frame, link, bag)
-        position = position + turn.apply(link.position[0])
+        # A copy: Rotation.apply refuses read-only arrays.
+        position = position + turn.apply(link.position[0].copy())
         turn = turn * Rotation.from_quat(link.quaternion[0])
     return Trajectory(first.stamp_ns, position, turn.as_quat(), WORLD)
 
