@@ -93,7 +93,7 @@ def test_seven_scenes(tmp_path):
     ('rgb.txt', 3, 'soon rgb/x.jpg', r"rgb\.txt, line 4: 'soon' is no number"),
     ('rgb.txt', 3, 'nan rgb/x.jpg', r"rgb\.txt, line 4: 'nan' is no time stamp"),
     ('rgb.txt', 3, '1305031229.6 rgb/gone.jpg', r'line 4: there is no image .*gone\.jpg'),
-    ('groundtruth.txt', 2, '1305031229.5 1 2 3', r'groundtruth\.txt, line 3: 4 fields; expected 8'),
+    ('groundtruth.txt', 2, '1305031229.5 1 2 3', r'truth\.txt, line 3: 4 fields; expected 8'),
     ('groundtruth.txt', 2, '1305031229.6 1 2 three 0 0 0 1', r'line 3: .*three'),
     ('groundtruth.txt', 2, '1305031229.6 1 nan 3 0 0 0 1', r'line 3: the pose holds NaN'),
     ('groundtruth.txt', 2, '1305031229.6 1 2 3 0 0 0 inf', r'line 3: the pose holds NaN or inf'),

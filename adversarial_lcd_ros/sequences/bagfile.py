@@ -229,6 +229,7 @@ class BagWriter:
         self._writer = Writer(self._folder / self._destination.name, version=_BAG_VERSION,
                               storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
+        self._is_open = True
         self._connections: dict[str, Connection] = {}
 
     def write(self, topic: str, message_type: str, stamp_ns: int, cdr: bytes) -> None:
@@ -246,7 +247,7 @@ class BagWriter:
     def close(self) -> None:
         """Complete the bag and move it to its place; where that fails, throw it away."""
         try:
-            self._writer.close()
+            self._stop(None)
             if self._destination.exists():
                 self._destination.rename(self._folder / 'replaced')
             (self._folder / self._destination.name).rename(self._destination)
@@ -257,8 +258,16 @@ class BagWriter:
 
     def abort(self) -> None:
         """Throw the half-written bag away."""
-        self._writer.abort()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        try:
+            self._stop(SequenceError('the bag is thrown away'))
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _stop(self, error: SequenceError | None) -> None:
+        # Leaving the writer's context is what all versions of rosbags offer to stop early.
+        if self._is_open:
+            self._is_open = False
+            self._writer.__exit__(None if error is None else type(error), error, None)
 
     def __enter__(self) -> Self:
         return self
