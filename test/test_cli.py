@@ -1,0 +1,158 @@
+"""The command: thin, errors in one line, exit codes."""
+
+from graph_factory import make_graph
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros import __version__, codec
+from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.sequences.bagfile import BagWriter
+from adversarial_lcd_ros.settings import render_parameters
+
+COMMANDS = ('demo', 'import', 'evaluate', 'report', 'train', 'fetch-model', 'inspect', 'params')
+
+
+def wire(payload):
+    """Return the CDR of the byte array that carries a payload."""
+    types = codec.typestore().types
+    layout = types['std_msgs/msg/MultiArrayLayout'](dim=[], data_offset=0)
+    message = types['std_msgs/msg/UInt8MultiArray'](
+        layout=layout, data=np.frombuffer(payload, np.uint8))
+    return bytes(codec.typestore().serialize_cdr(message, 'std_msgs/msg/UInt8MultiArray'))
+
+
+def payloads():
+    """Return one payload of every message, by name."""
+    graph = make_graph()
+    header = {'stamp_ns': 1_500_000_000, 'frame_id': 'camera', 'sequence': 4}
+    return {
+        'MultiTierGraph': codec.encode_graph(graph),
+        'LoopClosure': codec.encode_loop_closure(codec.LoopClosure(
+            **header, is_loop=True, probability=0.75, match_stamp_ns=1, match_sequence=2)),
+        'LcdQuery': codec.encode_query(codec.LcdQuery(9, graph)),
+        'LcdAnswer': codec.encode_answer(codec.LcdAnswer(9, True, True, 0.75)),
+        'AttackReport': codec.encode_attack_report(codec.AttackReport(
+            **header, status='success', queries=40)),
+    }
+
+
+@pytest.fixture
+def graph_bag(tmp_path):
+    path = tmp_path / 'recorded'
+    with BagWriter(path) as bag:
+        for number, nodes in enumerate((6, 8, 10)):
+            graph = make_graph(nodes, objects=2)
+            bag.write('/graph', 'std_msgs/msg/UInt8MultiArray', number * 500_000_000,
+                      wire(codec.encode_graph(graph)))
+        bag.write('/loop_closures', 'std_msgs/msg/UInt8MultiArray', 1_000_000_000,
+                  wire(payloads()['LoopClosure']))
+    return path
+
+
+def test_version_and_commands(capsys):
+    with pytest.raises(SystemExit, match='0'):
+        main(['--version'])
+    assert capsys.readouterr().out == f'adversarial-lcd {__version__}\n'
+    with pytest.raises(SystemExit, match='0'):
+        main(['--help'])
+    out = capsys.readouterr().out
+    for command in COMMANDS:
+        assert f'    {command}' in out
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_every_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit, match='0'):
+        main([command, '--help'])
+    assert 'usage: adversarial-lcd' in capsys.readouterr().out
+
+
+def test_help_shows_defaults_and_ranges(capsys):
+    with pytest.raises(SystemExit, match='0'):
+        main(['demo', '--help'])
+    out = ' '.join(capsys.readouterr().out.split())
+    assert f'(0.0 to 1.0, default: {AttackConfig().ratio})' in out
+
+
+@pytest.mark.parametrize('arguments', [
+    [], ['nonsense'], ['inspect'], ['demo', '--ratio', 'much'], ['demo', '--no-such-option']])
+def test_wrong_command_line_is_a_usage_error(arguments, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        main(arguments)
+    assert 'usage: adversarial-lcd' in capsys.readouterr().err
+
+
+def test_known_error_is_one_line_and_exit_code_2(tmp_path, capsys):
+    assert main(['inspect', str(tmp_path / 'gone')]) == 2
+    captured = capsys.readouterr()
+    assert captured.err == f'error: there is no bag {tmp_path / "gone"}\n'
+    assert captured.out == ''
+
+
+def test_interrupt_ends_with_130(monkeypatch, capsys):
+    def interrupt(destination, progress):
+        raise KeyboardInterrupt
+    monkeypatch.setattr('adversarial_lcd_ros.provision.fetch_object_model', interrupt)
+    assert main(['fetch-model']) == 130
+    assert capsys.readouterr().err == 'interrupted\n'
+
+
+def test_params_prints_the_parameter_file(capsys):
+    assert main(['params']) == 0
+    assert capsys.readouterr().out == render_parameters()
+
+
+def test_inspect_shows_topics_and_graphs_of_a_bag(graph_bag, capsys):
+    assert main(['inspect', str(graph_bag)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    rows = [line.replace('│', ' ').split() for line in lines if line.startswith('│')]
+    kind = 'std_msgs/msg/UInt8MultiArray'
+    assert rows[0] == ['/graph', kind, '3', 'MultiTierGraph']
+    assert rows[1] == ['/loop_closures', kind, '1', 'LoopClosure']
+    assert ' '.join(rows[2]) == '/graph 8.0 (6 to 10) 4.0 (4 to 4) 2.0 (2 to 2)'
+    assert any(line.rstrip().endswith(': 1.0 s') for line in lines)
+
+
+def test_inspect_refuses_a_topic_of_graphs_that_stops_being_one(tmp_path, capsys):
+    path = tmp_path / 'broken'
+    with BagWriter(path) as bag:
+        for number, payload in enumerate((payloads()['MultiTierGraph'], b'\x00\x01\x00\x00junk')):
+            bag.write('/graph', 'std_msgs/msg/UInt8MultiArray', number, wire(payload))
+    assert main(['inspect', str(path)]) == 2
+    assert 'are no MultiTierGraph' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('name', 'shown'), [
+    ('MultiTierGraph', 'MultiTierGraph: n = 6, m = 4, 2 objects'),
+    ('LcdQuery', 'LcdQuery 9: n = 6, m = 4, 2 objects'),
+    ('LoopClosure', 'probability=0.75'),
+    ('LcdAnswer', 'LcdAnswer(id=9, is_loop=True'),
+    ('AttackReport', "status='success'"),
+])
+def test_inspect_knows_every_payload(tmp_path, capsys, name, shown):
+    path = tmp_path / 'payload.cdr'
+    path.write_bytes(payloads()[name])
+    assert main(['inspect', str(path)]) == 0
+    assert shown in capsys.readouterr().out
+
+
+def test_inspect_says_what_a_file_is_not(tmp_path, capsys):
+    path = tmp_path / 'notes.txt'
+    path.write_text('hello')
+    assert main(['inspect', str(path)]) == 2
+    assert 'is neither a bag nor a payload of MultiTierGraph' in capsys.readouterr().err
+
+
+def test_import_reports_what_it_wrote(tmp_path, capsys):
+    cv2 = pytest.importorskip('cv2')
+    source = tmp_path / 'frames'
+    source.mkdir()
+    for number in range(3):
+        cv2.imwrite(str(source / f'{number}.png'), np.full((24, 32, 3), 60 * number, np.uint8))
+    command = ['import', str(source), str(tmp_path / 'bag'), '--rate-hz', '10']
+    assert main(command) == 0
+    assert '3 frames of 32 x 24 pixels, 0 poses, 0.2 s' in capsys.readouterr().out
+    assert main(command) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert main([*command, '--overwrite']) == 0
