@@ -1,5 +1,6 @@
 """Sequences from bags of ROS 1 and ROS 2, and the bag that an import writes."""
 
+from pathlib import Path
 import sqlite3
 
 import bag_factory as make
@@ -13,6 +14,7 @@ from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import PLACE_INDEX, import_sequence, open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 
+TOUR = Path(__file__).resolve().parents[1] / 'bags' / 'flat_tour'
 PLUGINS = pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
 
 
@@ -139,10 +141,15 @@ def test_groundtruth_beside_a_bag_wins_over_its_tf(tmp_path):
 
 def test_tf_without_the_camera_or_with_a_loose_mount_is_refused(tmp_path):
     tum_bag(tmp_path / 'bare.bag', mount=make.TUM_MOUNT[:1])
-    with pytest.raises(SequenceError, match=r"no chain from world to the camera frame '/openni_rgb"
-                                            r".*knows kinect, openni_camera"):
+    with pytest.raises(SequenceError, match=r"no single chain from world to the camera frame "
+                                            r"'openni_rgb.*it has kinect > openni_camera, "):
         open_sequence(tmp_path / 'bare.bag')
     assert open_sequence(tmp_path / 'bare.bag', ground_truth='none').trajectory is None
+    tum_bag(tmp_path / 'robot.bag', mount=(
+        *make.TUM_MOUNT, ('/base_link', '/kinect', (9, 9, 9), (0, 0, 0, 1))))
+    tum_bag(tmp_path / 'tum.bag')
+    np.testing.assert_array_equal(open_sequence(tmp_path / 'robot.bag').trajectory.position,
+                                  open_sequence(tmp_path / 'tum.bag').trajectory.position)
     loose = (*make.TUM_MOUNT, ('/openni_camera', '/openni_rgb_frame', (0.3, 0, 0), (0, 0, 0, 1)))
     store, make1 = make.ros1_messages()
     tf = [('/tf', make.TUM_TF, stamp + late, make1.make(make.TUM_TF, transforms=[make1.link(
@@ -365,3 +372,13 @@ def test_gardens_point_keeps_its_index(shared_data, tmp_path):
     truth = open_sequence(tmp_path / 'bag').trajectory
     assert truth.frame_id == PLACE_INDEX
     assert truth.position[:, 0].tolist() == [0, 1, 2, 0, 1, 2]
+
+
+def test_the_embedded_tour_is_whole(shared_data):
+    tour = open_sequence(TOUR)
+    assert (tour.name, tour.frame_count, tour.image_size) == ('flat_tour', 360, (640, 480))
+    np.testing.assert_array_equal(tour.trajectory.stamp_ns, tour.stamps_ns)
+    assert (TOUR / 'CREDITS.txt').stat().st_size > 3000
+    source = open_sequence(shared_data('flat_tour'))
+    assert all(a == b for a, b in zip(tour.frames(), source.frames(), strict=True))
+    np.testing.assert_array_equal(tour.trajectory.quaternion, source.trajectory.quaternion)

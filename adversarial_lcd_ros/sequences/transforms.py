@@ -31,34 +31,30 @@ def tf_trajectory(bag: BagFile, camera_frame: str) -> Trajectory | None:
 
     """
     links = _links(bag)
-    if not any(parent == WORLD for parent, _ in links.values()):
+    if not any(parent == WORLD for parent, _ in links):
         return None
-    chain = _chain(links, camera_frame, bag)
-    first, *mount = [links[frame][1] for frame in chain]
-    turn, position = Rotation.from_quat(first.quaternion), first.position.copy()
-    for frame, link in zip(chain[1:], mount, strict=True):
+    chain = _chain(set(links), camera_frame.strip('/'), bag)
+    moving, *mount = [_trajectory(links[link]) for link in chain]
+    turn, position = Rotation.from_quat(moving.quaternion), moving.position.copy()
+    for (_, frame), link in zip(chain[1:], mount, strict=True):
         _check_still(frame, link, bag)
         # A copy: Rotation.apply refuses read-only arrays.
         position = position + turn.apply(link.position[0].copy())
         turn = turn * Rotation.from_quat(link.quaternion[0])
-    return Trajectory(first.stamp_ns, position, turn.as_quat(), WORLD)
+    return Trajectory(moving.stamp_ns, position, turn.as_quat(), WORLD)
 
 
-def _links(bag: BagFile) -> dict[str, tuple[str, Trajectory]]:
-    """Return the parent of each frame, and its poses in the parent."""
-    rows: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
-    parents: dict[str, str] = {}
+def _links(bag: BagFile) -> dict[tuple[str, str], list[tuple[float, ...]]]:
+    """Return stamp, position and quaternion of each link (parent, child) in /tf."""
+    rows: defaultdict[tuple[str, str], list[tuple[float, ...]]] = defaultdict(list)
     for topic, _, wire in bag.messages(bag.of_type(TF, *OLD_TF)):
         for link in bag.decode(topic, wire).transforms:
-            child, parent = link.child_frame_id.strip('/'), link.header.frame_id.strip('/')
-            if parents.setdefault(child, parent) != parent:
-                raise SequenceError(f'bag {bag.path}: in /tf the frame {child} hangs from both '
-                                    f'{parents[child]} and {parent}')
-            stamp, move, turn = link.header.stamp, link.transform.translation, \
-                link.transform.rotation
-            rows[child].append((stamp.sec * 1_000_000_000 + stamp.nanosec, move.x, move.y, move.z,
-                                turn.x, turn.y, turn.z, turn.w))
-    return {child: (parent, _trajectory(rows[child])) for child, parent in parents.items()}
+            stamp = link.header.stamp
+            move, turn = link.transform.translation, link.transform.rotation
+            rows[link.header.frame_id.strip('/'), link.child_frame_id.strip('/')].append(
+                (stamp.sec * 1_000_000_000 + stamp.nanosec, move.x, move.y, move.z,
+                 turn.x, turn.y, turn.z, turn.w))
+    return rows
 
 
 def _trajectory(rows: list[tuple[float, ...]]) -> Trajectory:
@@ -68,19 +64,22 @@ def _trajectory(rows: list[tuple[float, ...]]) -> Trajectory:
     return Trajectory(stamps, poses[:, :3], poses[:, 3:])
 
 
-def _chain(links: dict[str, tuple[str, Trajectory]], camera_frame: str,
-           bag: BagFile) -> list[str]:
-    """Return the frames from the one below world to the camera's."""
-    chain: list[str] = []
-    frame = camera_frame.strip('/')
-    while frame != WORLD and frame in links and frame not in chain:
-        chain.append(frame)
-        frame = links[frame][0]
-    if frame != WORLD or not chain:
-        raise SequenceError(
-            f'bag {bag.path}: /tf has no chain from {WORLD} to the camera frame '
-            f'{camera_frame!r} (it knows {", ".join(sorted(links))}); give the ground truth as a '
-            'file, or "none"')
+def _chain(links: set[tuple[str, str]], camera_frame: str,
+           bag: BagFile) -> list[tuple[str, str]]:
+    """Return the links from world to the camera."""
+    chain: list[tuple[str, str]] = []
+    frame = camera_frame
+    while frame != WORLD:
+        above = sorted(link for link in links if link[1] == frame)
+        # On a robot the camera may hang from its odometry as well: motion capture wins.
+        link = (WORLD, frame) if (WORLD, frame) in above else above[0] if len(above) == 1 else None
+        if link is None or link in chain:
+            known = ', '.join(f'{parent} > {child}' for parent, child in sorted(links))
+            raise SequenceError(
+                f'bag {bag.path}: /tf has no single chain from {WORLD} to the camera frame '
+                f'{camera_frame!r}; it has {known}; give the ground truth as a file, or "none"')
+        chain.append(link)
+        frame = link[0]
     return chain[::-1]
 
 
