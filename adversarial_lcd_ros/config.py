@@ -15,7 +15,7 @@ from typing import Any, ClassVar, TypeVar
 from adversarial_lcd_ros.errors import ConfigError
 
 TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow')
-PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip')
+PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
 SURROGATES = ('svm_rbf', 'none')
 MODES = ('query', 'surrogate', 'pass')
 
@@ -150,7 +150,8 @@ class AttackConfig(Config):
         'query', 'query: query-guided; surrogate: no queries, by a surrogate trained beforehand; '
         'pass: forward unchanged.', choices=MODES)
     perturbation: str = setting(
-        'eigencentrality', 'How candidate flips are chosen.', choices=PERTURBATIONS)
+        'eigencentrality', 'How candidate flips are chosen; recall is our own and the others are '
+        'those of the paper.', choices=PERTURBATIONS)
     surrogate: str = setting(
         'svm_rbf', 'Model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)

@@ -10,10 +10,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros.attack.attacker import Attacker, flip_features
+from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.oracle import Oracle, OracleSilentError, answer_logit, edit_budget
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS, Allowed, make_perturbation
 from adversarial_lcd_ros.attack.perturbations.eigencentrality import eigencentrality
+from adversarial_lcd_ros.attack.stepwise import flip_features
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.codec import LcdAnswer
@@ -124,7 +125,7 @@ def test_shortest_path_cuts_or_joins():
 
 
 @pytest.mark.parametrize('surrogate', ['svm_rbf', 'none'])
-@pytest.mark.parametrize('perturbation', list(PERTURBATIONS))
+@pytest.mark.parametrize('perturbation', [*PERTURBATIONS, 'recall'])
 def test_an_attack_keeps_to_its_budgets(perturbation, surrogate):
     config = AttackConfig(perturbation=perturbation, surrogate=surrogate, ratio=1e-3,
                           queries_per_edit=12)
@@ -147,7 +148,8 @@ def test_an_attack_keeps_to_its_budgets(perturbation, surrogate):
 def test_same_seed_same_bytes_and_another_seed_another_search():
     def queries(seed):
         detector = SecretDetector(GRAPH, start=50.0)
-        config = AttackConfig(perturbation='random_flip', ratio=1e-3, queries_per_edit=5, seed=seed)
+        config = AttackConfig(perturbation='random_flip', ratio=1e-3, queries_per_edit=5,
+                              seed=seed)
         result = Attacker(config).process(GRAPH, detector)
         return result.perturbed, detector.asked
     assert queries(1) == queries(1)
@@ -271,7 +273,7 @@ def surrogate_data(tmp_path):
     features = flip_features(GRAPH, x, pairs, 2)
     is_loop = np.arange(120) % 2 == 0
     data = SurrogateData(features, np.where(features[:, 0] > np.median(features[:, 0]), 1.0, -1.0),
-                         is_loop, np.r_[.1, .2, .3, .7, .8], np.array([False, False, True, True, True]))
+                         is_loop, np.r_[.1, .2, .3, .7, .8], np.arange(5) >= 2)
     path = tmp_path / 'surrogate.npz'
     data.save(path)
     return path
@@ -302,3 +304,59 @@ def test_damaged_surrogate_data_is_refused(tmp_path, surrogate_data):
 def test_surrogate_mode_without_a_surrogate_is_refused():
     with pytest.raises(ConfigError, match='needs a surrogate'):
         Attacker(AttackConfig(mode='surrogate', surrogate='none'))
+
+
+def later(graph, seconds):
+    return replace(graph, stamp_ns=graph.stamp_ns + round(seconds * 1e9))
+
+
+def test_recall_keeps_to_its_budgets_and_changes_nothing_else():
+    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker.process(GRAPH, SecretDetector(GRAPH))
+    for start in (50.0, -50.0):
+        now = later(GRAPH, 20)
+        detector = SecretDetector(now, start=start, step=0.0)
+        result = attacker.process(now, detector)
+        assert result.queries == len(detector.asked) <= result.query_budget
+        assert all(len(now.flips_to(asked)) <= 3 for asked in detector.asked)
+        assert result.perturbed == now
+
+
+def test_recall_deletes_edges_that_recur():
+    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker.process(GRAPH, SecretDetector(GRAPH))
+    now = later(GRAPH, 20)
+    edges = {tuple(pair) for pair in now.edge.tolist()}
+    result = attacker.process(now, SecretDetector(now, start=2.5, secret=edges))
+    assert result.status == 'success'
+    assert {tuple(pair) for pair in result.flips.tolist()} <= edges
+    assert (result.flips >= 2).all()
+
+
+def test_recall_adds_edges_that_like_looking_features_had():
+    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker.process(GRAPH, SecretDetector(GRAPH))
+    gone = later(GRAPH.flip([(10, 11), (30, 31), (40, 41)]), 20)
+    detector = SecretDetector(gone, start=-2.5, step=-1.0,
+                              secret={(10, 11), (30, 31), (40, 41)})
+    result = attacker.process(gone, detector)
+    assert result.status == 'success'
+    assert result.flips.tolist() == [[10, 11], [30, 31], [40, 41]]
+    assert result.queries == 2
+
+
+def test_recall_knows_nothing_of_the_last_eight_seconds():
+    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker.process(GRAPH, SecretDetector(GRAPH))
+    result = attacker.process(later(GRAPH, 7), SecretDetector(later(GRAPH, 7)))
+    assert (result.status, result.reason) == ('failure', 'no graph left to recall')
+
+
+def test_recall_without_queries(surrogate_data):
+    config = AttackConfig(perturbation='recall', mode='surrogate', ratio=1e-3,
+                          surrogate_data=str(surrogate_data))
+    attacker = Attacker(config)
+    attacker.process(GRAPH, SecretDetector(GRAPH))
+    detector = SecretDetector(GRAPH)
+    result = attacker.process(later(GRAPH, 20), detector)
+    assert (len(result.flips), result.queries, detector.asked) == (3, 0, [])

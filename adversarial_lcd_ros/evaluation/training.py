@@ -8,13 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.attack.memory import Memory
+from adversarial_lcd_ros.attack.oracle import answer_logit
+from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
+from adversarial_lcd_ros.attack.stepwise import flip_features
+from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
+from adversarial_lcd_ros.codec import LcdQuery
+from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.labels import label_frames
 from adversarial_lcd_ros.evaluation.pairs import sample_pairs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.training import LabelledPairs, Progress, fit_decision, retrieved_pairs
+from adversarial_lcd_ros.weisfeiler_lehman import node_features
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences import Trajectory
@@ -104,3 +112,52 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
                       for sequence, chosen in zip(sequences, drawn, strict=True)],
         'map_window': lcd.map_window, 'labels': asdict(labels), 'seed': seed}
     return fit_decision(target, drawn, lcd.map_window, progress, card)
+
+
+def collect_surrogate_data(graphs: Sequence[MultiTierGraph], lcd: LcdConfig, attack: AttackConfig,
+                           flips_per_frame: int, progress: Progress | None = None
+                           ) -> SurrogateData:
+    """
+    Return what an attacker learns by querying a detector on a stream of its own.
+
+    Parameters
+    ----------
+    graphs : sequence of MultiTierGraph
+        Training stream, in order of time; not one that is attacked later.
+    lcd : LcdConfig
+        The detector that answers.
+    attack : AttackConfig
+        Its perturbation proposes the flips.
+    flips_per_frame : int
+        Flips queried on every frame; the clean graph costs one query more.
+    progress : callable, optional
+        Called with frames done and to do.
+
+    """
+    detector, memory = LoopClosureDetector(lcd), Memory()
+    perturbation = make_perturbation(attack.perturbation)
+    features, gains, loops, word_score, word_loop = [], [], [], [], []
+    for done, graph in enumerate(graphs):
+        answer = detector.answer(LcdQuery(0, graph))
+        similar = memory.similar(graph, 1)
+        if similar:
+            side = -1.0 if answer.is_loop else 1.0
+            pairs = perturbation.propose(graph, flips_per_frame, Allowed(attack.edits),
+                                         np.random.default_rng((attack.seed, done)))
+            logits = [answer_logit(detector.answer(LcdQuery(0, graph.flip(pair))))
+                      for pair in pairs]
+            gains += [side * (logit - answer_logit(answer)) for logit in logits]
+            features.append(flip_features(graph, node_features(graph), pairs,
+                                          attack.wl_iterations))
+            loops += [answer.is_loop] * len(pairs)
+            word_score.append(similar[0][1])
+            word_loop.append(answer.is_loop)
+        detector.detect(graph)
+        memory.add(graph)
+        if progress:
+            progress(done + 1, len(graphs))
+    if not features:
+        raise EvaluationError(f'{len(graphs)} graphs: none came eight seconds after another')
+    return SurrogateData(np.concatenate(features).astype(np.float32).astype(np.float64),
+                         np.array(gains), np.array(loops), np.array(word_score),
+                         np.array(word_loop))

@@ -1,0 +1,89 @@
+"""What a search for flips works on, and what it comes back with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from adversarial_lcd_ros.attack.oracle import Oracle, answer_logit
+from adversarial_lcd_ros.graph import MultiTierGraph
+
+
+@dataclass
+class Hunt:
+    """
+    The best graph found so far, and the oracle that judges others.
+
+    Attributes
+    ----------
+    clean, best : MultiTierGraph
+    edit_budget : int
+        Most pairs in which ``best`` may differ from ``clean``.
+    oracle : Oracle
+    is_loop : bool
+        The detector's answer to the clean graph: y of Eq. (1).
+    loss : float
+        Attack loss of ``best``: -logit where the clean graph was a loop, else +logit.
+    hopeless : bool
+        The detector had nothing to compare with: no flip can change its mind.
+    succeeded : bool
+        The detector changes its decision on ``best``.
+    trace : list of float
+        Largest loss after each query.
+
+    """
+
+    clean: MultiTierGraph
+    best: MultiTierGraph
+    edit_budget: int
+    oracle: Oracle
+    is_loop: bool
+    loss: float
+    hopeless: bool = False
+    succeeded: bool = False
+    trace: list[float] = field(default_factory=list)
+
+    @classmethod
+    def begin(cls, graph: MultiTierGraph, edit_budget: int, oracle: Oracle) -> Hunt:
+        """Spend the first query on the clean graph."""
+        answer = oracle(graph)
+        logit = answer_logit(answer)
+        return cls(graph, graph, edit_budget, oracle, answer.is_loop,
+                   -logit if answer.is_loop else logit,
+                   hopeless=answer.is_soft and answer.probability == 0)
+
+    @property
+    def over(self) -> str:
+        """Why the hunt ends; empty while it goes on."""
+        return 'decision changed' if self.succeeded else self.oracle.exhausted
+
+    def ask(self, graph: MultiTierGraph) -> tuple[float, bool]:
+        """Spend a query; return a graph's attack loss, and whether it changes the decision."""
+        answer = self.oracle(graph)
+        logit = answer_logit(answer)
+        loss = -logit if self.is_loop else logit
+        self.trace.append(max(loss, self.trace[-1] if self.trace else self.loss))
+        return loss, answer.is_loop != self.is_loop
+
+    def keep(self, graph: MultiTierGraph, loss: float, succeeded: bool) -> None:
+        """Make a graph the best so far."""
+        self.best, self.loss, self.succeeded = graph, loss, succeeded
+
+
+class Search(Protocol):
+    """A way to look for flips."""
+
+    def hunt(self, hunt: Hunt, rng: np.random.Generator) -> str:
+        """Improve ``hunt.best``; return why it ended."""
+        ...
+
+    def guess(self, graph: MultiTierGraph, edit_budget: int,
+              rng: np.random.Generator) -> MultiTierGraph:
+        """Return a perturbed graph without a query (surrogate mode)."""
+        ...
+
+    def observe(self, graph: MultiTierGraph) -> None:
+        """Remember a clean graph; called with each, after it was attacked."""
+        ...
