@@ -8,6 +8,8 @@ from scipy import sparse
 
 from adversarial_lcd_ros.graph import FEATURE_TIER, MultiTierGraph
 
+FLIPS_AT_ONCE = 128
+LENGTH_SCALE = 0.1
 NODE_FEATURES = ('is_object', 'x', 'y', 'log_size', 'score', 'log_degree')
 
 
@@ -69,7 +71,7 @@ def pooled_features(graph: MultiTierGraph, x: NDArray[np.float64],
     The paper concatenates node by node (Eq. 5), which ties phi to one frame's nodes; this one
     does not depend on their order and carries over between frames.
     """
-    levels = iterate(x, graph.weighted_adjacency(), iterations)
+    levels = iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)
     return np.concatenate([np.r_[level.mean(axis=0), level.std(axis=0)] for level in levels])
 
 
@@ -77,4 +79,54 @@ def concatenated_features(graph: MultiTierGraph, x: NDArray[np.float64],
                           iterations: int) -> NDArray[np.float64]:
     """Return phi(G) of Eq. (5) and (6), the node features of every level, shape (n d H,)."""
     return np.concatenate([level.ravel()
-                           for level in iterate(x, graph.weighted_adjacency(), iterations)])
+                           for level in iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
+
+
+def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
+                  iterations: int) -> NDArray[np.float64]:
+    """
+    Return how each single flip changes the pooled features, times n, shape (k, 2 d H).
+
+    Differences carry over between frames, where phi(G') itself mostly tells the frame. All flips
+    go through the iterations together: a flip changes two rows of the aggregation.
+
+    Parameters
+    ----------
+    graph : MultiTierGraph
+    x : float64, (n, d)
+        Initial node features.
+    pairs : int, (k, 2)
+    iterations : int
+        H.
+
+    """
+    base = pooled_features(graph, x, iterations)
+    chunks = [_flipped(graph, x, pairs[start:start + FLIPS_AT_ONCE], iterations) - base
+              for start in range(0, len(pairs), FLIPS_AT_ONCE)]
+    return graph.node_count * np.concatenate([*chunks, np.zeros((0, len(base)))])
+
+
+def _flipped(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
+             iterations: int) -> NDArray[np.float64]:
+    """Return the pooled features after each single flip, shape (k, 2 d H)."""
+    weight = graph.weighted_adjacency(LENGTH_SCALE)
+    u, v, each = pairs[:, 0], pairs[:, 1], np.arange(len(pairs))
+    step = np.where(graph.has_edges(pairs), -1, 1)
+    length = graph.length_between(pairs).astype(np.float64)
+    change = (step * np.exp(-length / LENGTH_SCALE))[:, None]
+    total = np.repeat(weight.sum(axis=1)[:, None], len(pairs), axis=1)
+    degree = np.repeat(np.diff(weight.indptr)[:, None], len(pairs), axis=1)
+    for end in (u, v):
+        total[end, each] += change[:, 0]
+        degree[end, each] += step
+    lonely = (degree == 0)[:, :, None]
+    scale = np.where(lonely, 0, 1 / np.where(lonely, 1, total[:, :, None]))
+    level = np.repeat(x[:, None, :], len(pairs), axis=1)
+    pooled = []
+    for _ in range(iterations):
+        mean = (weight @ level.reshape(len(x), -1)).reshape(level.shape)
+        mean[u, each] += change * level[v, each]
+        mean[v, each] += change * level[u, each]
+        level = (level + np.where(lonely, level, scale * mean)) / 2
+        pooled += [level.mean(axis=0), level.std(axis=0)]
+    return np.concatenate(pooled, axis=1)

@@ -14,14 +14,18 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.oracle import Oracle, OracleSilentError, answer_logit, edit_budget
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS, Allowed, make_perturbation
 from adversarial_lcd_ros.attack.perturbations.eigencentrality import eigencentrality
-from adversarial_lcd_ros.attack.stepwise import flip_features
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError, ConfigError, ModelError
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.weisfeiler_lehman import iterate, node_features, pooled_features
+from adversarial_lcd_ros.weisfeiler_lehman import (
+    flip_features,
+    iterate,
+    node_features,
+    pooled_features,
+)
 
 RING = [(k, (k + 1) % 60) for k in range(60)]
 GRAPH = make_graph(60, [*RING, *((0, k) for k in range(2, 30)), (1, 40), (1, 50)], objects=2)
@@ -114,6 +118,30 @@ def test_eigencentrality_proposes_the_hub_first_and_breaks_ties_by_index():
     pairs = make_perturbation('eigencentrality').propose(
         star, 7, Allowed(), np.random.default_rng(0))
     assert pairs.tolist() == [[0, 1], [0, 2], [0, 3], [0, 4], [0, 5], [1, 2], [1, 3]]
+
+
+@given(graphs(min_nodes=2), st.integers(1, 60))
+def test_eigencentrality_proposes_by_falling_product(graph, count):
+    pairs = make_perturbation('eigencentrality').propose(
+        graph, count, Allowed(), np.random.default_rng(0))
+    x = eigencentrality(graph)
+    everything = np.sort(np.outer(x, x)[np.triu_indices(graph.node_count, 1)])[::-1]
+    assert len(pairs) == min(count, len(everything))
+    assert x[pairs[:, 0]] * x[pairs[:, 1]] == pytest.approx(everything[:len(pairs)], abs=1e-8)
+
+
+@given(graphs(min_nodes=1, max_nodes=20))
+def test_eigencentrality_is_an_eigenvector_of_the_largest_eigenvalue(graph):
+    x = eigencentrality(graph)
+    largest = np.linalg.eigvalsh(graph.adjacency.toarray())[-1]
+    assert graph.adjacency @ x == pytest.approx(largest * x, abs=1e-6)
+    assert np.linalg.norm(x) == pytest.approx(1)
+
+
+def test_eigencentrality_of_a_large_ring_is_even_and_repeatable():
+    ring = make_graph(200, [(k, (k + 1) % 200) for k in range(200)])
+    assert eigencentrality(ring) == pytest.approx(200 ** -0.5, abs=1e-6)
+    assert eigencentrality(ring).tolist() == eigencentrality(ring).tolist()
 
 
 def test_shortest_path_cuts_or_joins():
@@ -237,13 +265,15 @@ def test_one_wl_iteration_by_hand():
     assert level.ravel() == pytest.approx([1.5, (2 + 3.5) / 2, 4.0])
 
 
-def test_flip_features_are_the_difference_that_a_flip_makes():
-    x = node_features(GRAPH)
-    pairs = flips_of(GRAPH, np.random.default_rng(0), 5)
-    found = flip_features(GRAPH, x, pairs, 2)
+@given(graphs(), st.integers(0, 2**16), st.integers(1, 3))
+def test_flip_features_are_the_difference_that_a_flip_makes(graph, seed, iterations):
+    x = node_features(graph)
+    pairs = flips_of(graph, np.random.default_rng(seed), 5)
+    found = flip_features(graph, x, pairs, iterations)
+    clean = pooled_features(graph, x, iterations)
     for pair, row in zip(pairs, found, strict=True):
-        change = pooled_features(GRAPH.flip(pair), x, 2) - pooled_features(GRAPH, x, 2)
-        assert row == pytest.approx(60 * change)
+        change = pooled_features(graph.flip(pair), x, iterations) - clean
+        assert row == pytest.approx(graph.node_count * change, abs=1e-6)
 
 
 def blobs(seed=0, rows=80):

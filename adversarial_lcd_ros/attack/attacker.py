@@ -17,7 +17,7 @@ from adversarial_lcd_ros.attack.stepwise import Stepwise
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.codec import AttackReport
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import BudgetError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.paths import model_path
 
@@ -139,5 +139,7 @@ class Attacker:
                 reason = self._search.hunt(hunt, rng)
             except OracleSilentError:
                 reason = 'no answer'
+            except BudgetError:  # the deadline passed since the search looked
+                reason = oracle.exhausted
         return AttackResult(graph, hunt.best, 'success' if hunt.succeeded else 'failure', reason,
                             edits, queries, oracle.used, before, hunt.loss, tuple(hunt.trace))

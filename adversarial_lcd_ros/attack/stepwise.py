@@ -14,8 +14,9 @@ from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import Surrogate, make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.errors import BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.weisfeiler_lehman import node_features, pooled_features
+from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features
 
 POOL_FACTOR = 3
 REFIT_EVERY = 20
@@ -97,14 +98,15 @@ class Stepwise:
         waiting = list(range(len(pool)))
         best: tuple[float, bool, MultiTierGraph] | None = None
         for _ in range(min(self._config.queries_per_edit, len(pool))):
-            if hunt.oracle.exhausted:
-                break
             if learner and features is not None:
                 waiting = learner.ranked(features, waiting)
             place = waiting.pop(0)
             allowed.mark(before, pool[place:place + 1])
             flipped = before.flip(pool[place:place + 1])
-            loss, succeeded = hunt.ask(flipped)
+            try:
+                loss, succeeded = hunt.ask(flipped)
+            except BudgetError:
+                break
             if learner and features is not None:
                 learner.learn(features[place], loss - hunt.loss)
             if best is None or loss > best[0]:
@@ -131,25 +133,3 @@ class Stepwise:
         score = surrogate.predict(
             flip_features(graph, node_features(graph), pool, self._config.wl_iterations))
         return graph.flip(pool[np.argsort(-score, kind='stable')[:edit_budget]])
-
-
-def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
-                  iterations: int) -> NDArray[np.float64]:
-    """
-    Return how each single flip changes the pooled WL features, times n, shape (k, 2 d H).
-
-    Differences carry over between frames, where phi(G') itself mostly tells the frame.
-
-    Parameters
-    ----------
-    graph : MultiTierGraph
-    x : float64, (n, d)
-        Initial node features.
-    pairs : int, (k, 2)
-    iterations : int
-        H.
-
-    """
-    base = pooled_features(graph, x, iterations)
-    rows = [pooled_features(graph.flip(pair), x, iterations) - base for pair in pairs]
-    return graph.node_count * np.array(rows).reshape(len(pairs), len(base))

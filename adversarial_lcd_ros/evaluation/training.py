@@ -11,7 +11,6 @@ import numpy as np
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.oracle import answer_logit
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
-from adversarial_lcd_ros.attack.stepwise import flip_features
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
@@ -22,7 +21,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.training import LabelledPairs, Progress, fit_decision, retrieved_pairs
-from adversarial_lcd_ros.weisfeiler_lehman import node_features
+from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences import Trajectory

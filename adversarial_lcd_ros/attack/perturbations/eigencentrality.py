@@ -11,6 +11,8 @@ from scipy.sparse.linalg import eigsh
 from adversarial_lcd_ros.attack.perturbations.base import Allowed
 from adversarial_lcd_ros.graph import MultiTierGraph
 
+DENSE_BELOW = 100
+TIE = 1e-9
 TIE_DECIMALS = 9
 
 
@@ -19,24 +21,30 @@ def eigencentrality(graph: MultiTierGraph) -> NDArray[np.float64]:
     Return the eigenvector x of the largest eigenvalue of A, at least 0, unit length, (n,).
 
     Of a disconnected graph it is that of the component with the largest eigenvalue, 0 elsewhere;
-    equally large components share it. The shift A + I leaves eigenvectors alone and keeps the
-    spectrum from being symmetric about 0 (bipartite graphs).
+    components that tie for the largest share it. Without edges all nodes are alike.
     """
     count = graph.node_count
-    if count < 3 or not graph.edge_count:
+    if not graph.edge_count:
         return np.full(count, 1 / np.sqrt(max(count, 1)))
-    shifted = graph.adjacency.copy()
-    shifted.setdiag(1.0)
-    _, vectors = eigsh(shifted.tocsr(), k=1, which='LA', v0=np.ones(count), tol=1e-10)
-    centrality: NDArray[np.float64] = np.abs(vectors[:, 0])
-    return centrality
+    if count < DENSE_BELOW:
+        values, vectors = np.linalg.eigh(graph.adjacency.toarray())
+        # Any vector of a repeated eigenvalue would do; the projection of 1 treats nodes alike.
+        space = vectors[:, values > values[-1] - TIE]
+        shared = np.abs(space @ space.sum(axis=0))
+        x: NDArray[np.float64] = shared / np.linalg.norm(shared)
+        return x
+    # From a start without symmetry: from an exact eigenvector the Lanczos iteration would go on
+    # with random numbers of its own.
+    start = np.random.default_rng(0).uniform(0.5, 1.5, count)
+    _, vectors = eigsh(graph.adjacency, k=1, which='LA', v0=start, tol=1e-10)
+    return np.abs(vectors[:, 0])
 
 
 class Eigencentrality:
     """
     The pairs with the largest x_u x_v, recomputed on the graph at hand.
 
-    Products that agree to nine decimals tie; ties go to the smaller node indices.
+    Centralities that agree to nine decimals tie; ties go to the smaller node indices.
     """
 
     name: ClassVar[str] = 'eigencentrality'
@@ -44,22 +52,32 @@ class Eigencentrality:
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:
         """Return the pairs by falling product of centralities."""
-        x = eigencentrality(graph)
-        product = np.round(np.triu(np.outer(x, x), 1), TIE_DECIMALS)
-        source, target = np.triu_indices(graph.node_count, 1)
-        value = product[source, target]
-        wanted = min(count + len(allowed.tried), len(value))
+        x = np.round(eigencentrality(graph), TIE_DECIMALS)
+        rank = np.argsort(-x, kind='stable')
+        every = graph.node_count * (graph.node_count - 1) // 2
+        wanted = min(count + len(allowed.tried), every)
         while wanted:
-            chosen = _largest(value, wanted)
-            pairs = allowed.filter(graph, np.stack([source[chosen], target[chosen]], axis=1))
-            if len(pairs) >= count or wanted == len(value):
-                return pairs[:count]
-            wanted = min(4 * wanted, len(value))
+            ranks = _leading_pairs(graph.node_count, wanted)
+            pairs = np.sort(rank[ranks], axis=1)
+            product = np.round(x[pairs[:, 0]] * x[pairs[:, 1]], TIE_DECIMALS)
+            order = np.lexsort((pairs[:, 1], pairs[:, 0], -product))[:wanted]
+            found = allowed.filter(graph, pairs[order])
+            if len(found) >= count or wanted == every:
+                return found[:count]
+            wanted = min(4 * wanted, every)
         return np.zeros((0, 2), np.int64)
 
 
-def _largest(value: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """Return the places of the largest values, falling, ties in order of place."""
-    bound = np.partition(value, len(value) - count)[len(value) - count]
-    places = np.flatnonzero(value >= bound)
-    return places[np.argsort(-value[places], kind='stable')][:count]
+def _leading_pairs(nodes: int, wanted: int) -> NDArray[np.int64]:
+    """
+    Return all pairs of ranks, shape (k, 2), that can be among the ``wanted`` largest products.
+
+    No pair (i, j), i < j, beats the (i + 1) j - i (i + 1) / 2 pairs whose ranks are both at most
+    its own, itself included.
+    """
+    first = np.arange(nodes - 1)
+    last = np.minimum((wanted + first * (first + 1) // 2) // (first + 1), nodes - 1)
+    length = np.maximum(last - first, 0)
+    i = np.repeat(first, length)
+    start = np.repeat(np.cumsum(length) - length, length)
+    return np.stack([i, i + 1 + np.arange(len(i)) - start], axis=1)
