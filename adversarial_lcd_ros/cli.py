@@ -9,15 +9,23 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros import __version__
-from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import (
+    AttackConfig,
+    BuilderConfig,
+    LabelConfig,
+    LcdConfig,
+    ReplayConfig,
+)
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.settings import (
     add_config_options,
+    chosen_settings,
     config_from_options,
     render_parameters,
 )
@@ -27,9 +35,11 @@ if TYPE_CHECKING:
 
 EXIT_OK, EXIT_ERROR, EXIT_INTERRUPTED = 0, 2, 130
 DEMO_BAG = 'bags/flat_tour'
+# Frames under way at once: the nodes work side by side, and nothing is lost.
+LIVE_WINDOW = 4
 # A class, and what its options start with where another class of the command has the name too.
 EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
-             (LabelConfig, 'label-'))
+             (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -133,6 +143,12 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
     parser.add_argument('--output', type=Path, default=Path('results'), metavar='FOLDER',
                         help='a folder named by the time is made in it, and "latest" '
                         '(default: %(default)s)')
+    parser.add_argument('--recipe', default='quick', metavar='NAME',
+                        help='the attacks: a recipe that ships, or a .yaml file like those in '
+                        'config/recipes; settings of the attacker given here win over it '
+                        '(default: %(default)s)')
+    parser.add_argument('--keep-recordings', action='store_true',
+                        help='keep all graphs and decisions, as bags, in the results folder')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
     for config_class, prefix in EVALUATED:
@@ -150,11 +166,28 @@ def _demo(options: Namespace) -> None:
 
 
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.live import evaluate_live
+    from rich.console import Console
 
-    builder, lcd, attack, labels = (config_from_options(options, config_class)
-                                    for config_class, _ in EVALUATED)
-    evaluate_live(bag, options.output, builder, lcd, attack, labels)
+    from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
+    from adversarial_lcd_ros.evaluation.recipes import load_recipe
+    from adversarial_lcd_ros.evaluation.tables import decline_table, figure_table
+    from adversarial_lcd_ros.evaluation.wording import headline
+
+    attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
+    plan = Plan(config_from_options(options, BuilderConfig),
+                config_from_options(options, LcdConfig),
+                config_from_options(options, LabelConfig),
+                replace(ReplayConfig(window=LIVE_WINDOW),
+                        **chosen_settings(options, ReplayConfig)),
+                attacks)
+    folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=_tell,
+                                    keep_recordings=options.keep_recordings)
+    console = Console()
+    console.print(figure_table(summary))
+    console.print(decline_table(summary))
+    console.print(headline(summary), soft_wrap=True)
+    console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
+                  soft_wrap=True)
 
 
 def _add_report(commands: _SubParsersAction[ArgumentParser]) -> None:

@@ -175,12 +175,17 @@ def config_from_options(options: Namespace, config_class: type[ConfigT]) -> Conf
         The file is not one, or a value is of the wrong type or out of range.
 
     """
+    return config_class.from_mapping(chosen_settings(options, config_class))
+
+
+def chosen_settings(options: Namespace, config_class: type[Config]) -> dict[str, Any]:
+    """Return the settings of a class that the command line or the ``--config`` file names."""
     values = dict(_from_file(options, config_class))
     for entry in fields(config_class):
         destination = _destination(config_class, entry)
         if hasattr(options, destination):
             values[entry.name] = getattr(options, destination)
-    return config_class.from_mapping(values)
+    return values
 
 
 def _from_file(options: Namespace, config_class: type[Config]) -> Iterator[tuple[str, Any]]:

@@ -78,8 +78,8 @@ def pooled_features(graph: MultiTierGraph, x: NDArray[np.float64],
 def concatenated_features(graph: MultiTierGraph, x: NDArray[np.float64],
                           iterations: int) -> NDArray[np.float64]:
     """Return phi(G) of Eq. (5) and (6), the node features of every level, shape (n d H,)."""
-    return np.concatenate([level.ravel()
-                           for level in iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
+    levels = iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)
+    return np.concatenate([level.ravel() for level in levels])
 
 
 def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],

@@ -37,7 +37,8 @@ def eigencentrality(graph: MultiTierGraph) -> NDArray[np.float64]:
     # with random numbers of its own.
     start = np.random.default_rng(0).uniform(0.5, 1.5, count)
     _, vectors = eigsh(graph.adjacency, k=1, which='LA', v0=start, tol=1e-10)
-    return np.abs(vectors[:, 0])
+    leading: NDArray[np.float64] = np.abs(vectors[:, 0])
+    return leading
 
 
 class Eigencentrality:
