@@ -37,6 +37,7 @@ EXIT_OK, EXIT_ERROR, EXIT_INTERRUPTED = 0, 2, 130
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
 LIVE_WINDOW = 4
+TABLE_WIDTH = 150
 # A class, and what its options start with where another class of the command has the name too.
 EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
              (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
@@ -147,6 +148,9 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         help='the attacks: a recipe that ships, or a .yaml file like those in '
                         'config/recipes; settings of the attacker given here win over it '
                         '(default: %(default)s)')
+    parser.add_argument('--rebuild', action='store_true',
+                        help='run every attack from the images (default: the first one; the '
+                        'others from its clean graphs)')
     parser.add_argument('--keep-recordings', action='store_true',
                         help='keep all graphs and decisions, as bags, in the results folder')
     parser.add_argument('--config', type=Path, metavar='FILE',
@@ -179,10 +183,11 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW),
                         **chosen_settings(options, ReplayConfig)),
-                attacks)
+                attacks, rebuild=options.rebuild)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=_tell,
                                     keep_recordings=options.keep_recordings)
-    console = Console()
+    # Where there is no terminal there is no width to keep to.
+    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
     console.print(figure_table(summary))
     console.print(decline_table(summary))
     console.print(headline(summary), soft_wrap=True)

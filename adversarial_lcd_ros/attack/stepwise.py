@@ -19,7 +19,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features
 
 POOL_FACTOR = 3
-REFIT_EVERY = 20
+REFIT_EVERY = 10
 
 
 @dataclass

@@ -54,6 +54,9 @@ class Plan:
         Settings; the replay is in lockstep, whatever they say.
     attacks : mapping
         Settings of every attack by the name of its run.
+    rebuild : bool
+        Replay the images for every attack. Otherwise they are for the first one, which shows
+        whether the graphs come out the same, and the others start from the graphs of that run.
     seed : int
         Of the bootstrap.
 
@@ -64,6 +67,7 @@ class Plan:
     labels: LabelConfig
     replay: ReplayConfig
     attacks: Mapping[str, AttackConfig]
+    rebuild: bool = False
     seed: int = 42
 
 
@@ -101,12 +105,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
     frames = Replay(bag, plan.replay).frame_count
     folder = ResultsFolder.create(output)
-    runs: dict[str, Recording] = {}
-    for number, (name, attack) in enumerate([(CLEAN, None), *plan.attacks.items()]):
-        tell(f'run {number + 1} of {len(plan.attacks) + 1}: {name}')
-        runs[name] = run_pipeline(bag, Setup(plan.builder, plan.lcd, plan.replay, attack),
-                                  folder.path / RECORDINGS / f'{number}')
-        _check(name, runs[name], frames)
+    runs = _replay(bag, plan, frames, folder.path / RECORDINGS, tell)
     tell('labels, figures and pictures')
     clean = runs.pop(CLEAN)
     labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in clean.clean],
@@ -124,6 +123,26 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     if not keep_recordings:
         shutil.rmtree(folder.path / RECORDINGS)
     return folder.finish(), summary
+
+
+def _replay(bag: Path, plan: Plan, frames: int, folder: Path,
+            tell: Callable[[str], None]) -> dict[str, Recording]:
+    """Replay the bag clean and under every attack; return the recordings by name of the run."""
+    runs: dict[str, Recording] = {}
+    for number, (name, attack) in enumerate([(CLEAN, None), *plan.attacks.items()]):
+        from_images = plan.rebuild or number < 2
+        tell(f'run {number + 1} of {len(plan.attacks) + 1}: {name}'
+             + ('' if from_images else ' (from the graphs of run 2)'))
+        setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
+        if not from_images:
+            # The recording holds the chosen frames only: nothing is to be skipped again.
+            replay = ReplayConfig(lockstep=True, window=plan.replay.window,
+                                  timeout_s=plan.replay.timeout_s, clock=plan.replay.clock)
+            setup = Setup(None, plan.lcd, replay, attack)
+        runs[name] = run_pipeline(bag if from_images else folder / '1' / 'recording', setup,
+                                  folder / f'{number}')
+        _check(name, runs[name], frames)
+    return runs
 
 
 def _check(name: str, run: Recording, frames: int) -> None:

@@ -35,9 +35,14 @@ _MAN_IN_THE_MIDDLE = ('-r', 'graph:=graph_clean')
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of the nodes; no attack: ``lcd`` listens to ``graph_builder``."""
+    """
+    Settings of the nodes.
 
-    builder: BuilderConfig
+    Without an attack, ``lcd`` listens to ``graph_builder``. Without a builder, the bag holds
+    the clean graphs of an earlier replay.
+    """
+
+    builder: BuilderConfig | None
     lcd: LcdConfig
     replay: ReplayConfig
     attack: AttackConfig | None = None
@@ -71,7 +76,7 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path) -> Recording:
     Parameters
     ----------
     bag : Path
-        Bag with images.
+        Bag with images, or with graphs where no builder is set up.
     setup : Setup
     folder : Path
         New folder; gets the recording, the parameters and a log of every node.
@@ -86,8 +91,9 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path) -> Recording:
     parameters = folder / 'parameters.yaml'
     parameters.write_text(yaml.safe_dump(_parameters(bag, setup, folder / 'recording')),
                           encoding='utf-8')
-    builder_arguments = _MAN_IN_THE_MIDDLE if setup.attack else ()
-    nodes: list[tuple[str, Sequence[str]]] = [('lcd', ()), ('graph_builder', builder_arguments)]
+    nodes: list[tuple[str, Sequence[str]]] = [('lcd', ())]
+    if setup.builder:
+        nodes.append(('graph_builder', _MAN_IN_THE_MIDDLE if setup.attack else ()))
     if setup.attack:
         nodes.append(('attacker', ()))
     with ExitStack() as stack:
@@ -101,9 +107,11 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path) -> Recording:
 
 
 def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
-    sections = {'lcd': asdict(setup.lcd), 'graph_builder': asdict(setup.builder),
+    sections = {'lcd': asdict(setup.lcd),
                 'bag_replay': {**asdict(setup.replay), 'bag': str(bag.resolve()),
                                'record': str(recording.resolve())}}
+    if setup.builder:
+        sections['graph_builder'] = asdict(setup.builder)
     if setup.attack:
         sections['attacker'] = asdict(setup.attack)
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}

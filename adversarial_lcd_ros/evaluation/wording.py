@@ -16,7 +16,9 @@ Attack = Mapping[str, Any]
 
 
 def attack_title(attack: Attack) -> str:
-    """Return what an attack is, in words."""
+    """Return what an attack is, in words: its name, or else its settings."""
+    if attack.get('name'):
+        return str(attack['name'])
     if attack['mode'] == 'pass':
         return 'control: forwarded unchanged'
     perturbation = _PERTURBATION.get(attack['perturbation'],
