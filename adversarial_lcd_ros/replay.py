@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.codec import typestore
+from adversarial_lcd_ros.codec import MESSAGES, schema_text, typestore
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.paths import PACKAGE
 from adversarial_lcd_ros.sequences.bagfile import (
     COMPRESSED_IMAGE,
     IMAGE,
@@ -27,9 +28,8 @@ from adversarial_lcd_ros.sequences.bagfile import (
     POSE,
     BagFile,
     BagWriter,
-    cdr_stamp_ns,
-    with_cdr_stamp,
 )
+from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 from adversarial_lcd_ros.sequences.sequence import check_order
 
 if TYPE_CHECKING:
@@ -195,7 +195,8 @@ class BagRecorder:
     Writes messages to a rosbag2 (MCAP), from any thread; the bag appears on ``close``.
 
     Log times ascend: a message whose stamp does not follow the last one is logged one
-    nanosecond after it, so that a bag reads in the order in which it was written.
+    nanosecond after it, so that a bag reads in the order in which it was written. The .msg
+    texts of the payloads go into the metadata: a recording explains itself, years later too.
 
     Raises
     ------
@@ -205,7 +206,11 @@ class BagRecorder:
     """
 
     def __init__(self, path: Path) -> None:
-        self._writer: BagWriter | None = BagWriter(Path(path))
+        schemas = {f'{PACKAGE}/msg/{message}': schema_text(message) for message in MESSAGES}
+        writer = BagWriter(Path(path))
+        for message, text in schemas.items():
+            writer.note(message, text)
+        self._writer: BagWriter | None = writer
         self._lock = threading.Lock()
         self._last_ns = -1
 

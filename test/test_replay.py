@@ -7,15 +7,19 @@ from bag_factory import ROS2, stamps
 from graph_factory import make_graph
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+import yaml
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.replay import BagRecorder, Replay, read_payloads
-from adversarial_lcd_ros.sequences.bagfile import BagFile, cdr_stamp_ns, with_cdr_stamp
+from adversarial_lcd_ros.sequences.bagfile import BagFile
+from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 
 PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
 PERIOD_S = make.PERIOD_NS / 1e9
@@ -172,6 +176,28 @@ def test_what_is_recorded_is_read(tmp_path):
         recorder.write('graph', PAYLOAD, 0, b'')
     with pytest.raises(SequenceError, match=r'exists already'):
         BagRecorder(path)
+
+
+def test_a_recording_explains_its_payloads(tmp_path):
+    graph = make_graph(stamp_ns=stamps()[0])
+    with BagRecorder(tmp_path / 'record') as recorder:
+        recorder.write('graph', PAYLOAD, 0, wire(payload_message(codec.encode_graph(graph)),
+                                                 PAYLOAD))
+    with (tmp_path / 'record' / 'record.mcap').open('rb') as file:
+        reader = make_reader(file)
+        (schema, _, message), = reader.iter_messages()
+        texts = yaml.safe_load(next(reader.iter_metadata()).metadata['serialized_metadata'])
+    # Nothing of ours from here on: a reader of MCAP, and the message definitions of ROS.
+    store = get_typestore(Stores.ROS2_JAZZY)
+    assert schema.name == PAYLOAD
+    assert b'uint8[]' in schema.data
+    name = 'adversarial_lcd_ros/msg/MultiTierGraph'
+    store.register(get_types_from_msg(texts['custom_data'][name], name))
+    payload = store.deserialize_cdr(message.data, PAYLOAD).data
+    found = store.deserialize_cdr(payload.tobytes(), name)
+    assert (found.width, found.height) == (graph.width, graph.height)
+    np.testing.assert_array_equal(found.node_label, graph.label)
+    np.testing.assert_array_equal(found.edge_length, graph.edge_length)
 
 
 def test_an_aborted_recording_leaves_nothing(tmp_path):

@@ -2,6 +2,8 @@
 
 import bag_factory as make
 import cv2
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
@@ -33,6 +35,33 @@ def test_tum_folder(tum):
     assert frames[2].data == make.encoded(make.picture(2))
 
 
+@settings(max_examples=40, deadline=None)
+@given(start=st.integers(0, 9), stop=st.none() | st.integers(0, 9), stride=st.integers(1, 9))
+@pytest.mark.parametrize('kind', ['folder', 'bag'])
+def test_a_part_of_the_frames_is_that_slice_of_all(tmp_path_factory, kind, start, stop, stride):
+    path = tmp_path_factory.getbasetemp() / f'slices_{kind}'
+    if not path.exists():
+        (make.tum_folder(path, 7) if kind == 'folder'
+         else make.write_ros2(path, make.jpeg_rows(7)))
+    sequence = open_sequence(path)
+    assert [frame.stamp_ns for frame in sequence.frames(start, stop, stride)] == make.stamps(7)[
+        start:stop:stride]
+
+
+@pytest.mark.parametrize('part', [(-1,), (0, -1), (0, None, 0)])
+def test_no_slice_from_behind(tum, part):
+    with pytest.raises(SequenceError, match=r'start and a stop of 0 or more'):
+        list(open_sequence(tum).frames(*part))
+
+
+def test_frames_left_out_are_not_read(tum):
+    sequence = open_sequence(tum)
+    sorted((tum / 'rgb').iterdir())[1].unlink()
+    assert len(list(sequence.frames(stride=2))) == 2
+    with pytest.raises(SequenceError, match=r'image .* cannot be read'):
+        list(sequence.frames())
+
+
 def test_ground_truth_may_be_absent_or_refused(tmp_path, tum):
     assert open_sequence(make.tum_folder(tmp_path / 'bare', truth=False)).trajectory is None
     assert open_sequence(tum, ground_truth='none').trajectory is None
@@ -55,6 +84,14 @@ def test_image_folder_with_a_pose_per_image(tmp_path):
     truth.write_text(make.pose_line(0))
     with pytest.raises(SequenceError, match=r'3 images.*1 poses'):
         open_sequence(folder, ground_truth=truth)
+
+
+def test_ground_truth_in_an_image_folder_is_used(tmp_path):
+    folder = images(tmp_path / 'walk')
+    (folder / 'groundtruth.txt').write_text(
+        '\n'.join(make.pose_line(stamp) for stamp in make.stamps(3)))
+    assert open_sequence(folder).trajectory.stamp_ns.tolist() == make.stamps(3)
+    assert open_sequence(folder, ground_truth='none').trajectory is None
 
 
 def test_walks_have_ground_truth_by_index(tmp_path):
@@ -144,9 +181,22 @@ def test_what_is_no_image_is_refused(tum, data):
         open_sequence(tum)
 
 
-def test_jpeg_padded_by_the_camera_is_read():
-    data = make.encoded(make.picture()) + b'\0' * 300
-    assert Frame(0, data, 'jpeg', make.WIDTH, make.HEIGHT).image().shape == (48, 64, 3)
+@pytest.mark.parametrize('suffix', ['.jpg', '.png'])
+@pytest.mark.parametrize('tail', [b'\0' * 300, b'data of the camera maker'])
+def test_what_a_camera_puts_behind_an_image_does_not_matter(tum, suffix, tail):
+    data = make.encoded(make.picture(), suffix) + tail
+    sorted((tum / 'rgb').iterdir())[0].write_bytes(data)
+    first = next(open_sequence(tum).frames())
+    assert (first.data, first.image().shape) == (data, (48, 64, 3))
+
+
+def test_the_end_of_a_thumbnail_is_not_that_of_the_image():
+    data, thumbnail = make.encoded(make.picture()), make.encoded(make.picture(1, 16, 16))
+    segment = b'\xff\xe1' + (2 + len(thumbnail)).to_bytes(2, 'big') + thumbnail
+    whole = data[:2] + segment + data[2:]
+    assert Frame(0, whole, 'jpeg', make.WIDTH, make.HEIGHT).image().shape == (48, 64, 3)
+    with pytest.raises(SequenceError, match=r'truncated JPEG'):
+        Frame(0, whole[:-40], 'jpeg', make.WIDTH, make.HEIGHT).image()
 
 
 def test_changing_image_size_is_refused(tum):
@@ -162,7 +212,8 @@ def test_raw_frames_become_bgr():
                                      ('mono8', grey, np.stack([grey] * 3, axis=2))):
         frame = Frame(0, data.tobytes(), encoding, make.WIDTH, make.HEIGHT)
         np.testing.assert_array_equal(frame.image(), expected)
-        assert np.abs(frame.jpeg().image().astype(int) - expected).mean() < 4
+        assert np.abs(frame.compressed().image().astype(int) - expected).mean() < 4
+        np.testing.assert_array_equal(frame.compressed('png').image(), expected)
     with pytest.raises(SequenceError, match=r'3072 bytes: expected 9216'):
         Frame(0, grey.tobytes(), 'bgr8', make.WIDTH, make.HEIGHT).image()
 
@@ -173,6 +224,14 @@ def test_raw_frames_become_bgr():
 def test_options_that_do_not_apply_are_refused(tum, options, message):
     with pytest.raises(SequenceError, match=message):
         open_sequence(tum, **options)
+
+
+def test_what_a_tum_folder_lacks_is_named(tum):
+    (tum / 'rgb.txt').unlink()
+    (tum / 'detections.csv').write_text('0 1 2 3 4 5\n')
+    with pytest.raises(SequenceError, match=r'has a groundtruth\.txt but no rgb\.txt'):
+        open_sequence(tum)
+    assert open_sequence(tum / 'rgb').frame_count == 4
 
 
 def test_what_is_no_sequence_is_refused(tmp_path):
@@ -195,5 +254,6 @@ def test_real_sequences(shared_data, name, frames, size, poses):
     sequence = open_sequence(shared_data(name))
     assert (sequence.frame_count, sequence.image_size) == (frames, size)
     assert len(sequence.trajectory) == poses
-    assert next(sequence.frames()).image().shape == (size[1], size[0], 3)
+    assert {frame.image().shape for frame in sequence.frames(stride=frames // 4)} == {
+        (size[1], size[0], 3)}
     assert sequence.trajectory.is_near(sequence.stamps_ns).mean() > 0.9

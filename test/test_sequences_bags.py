@@ -1,10 +1,13 @@
 """Sequences from bags of ROS 1 and ROS 2, and the bag that an import writes."""
 
 from pathlib import Path
+import shutil
 import sqlite3
 
 import bag_factory as make
 from bag_factory import ROS2, encoded, picture, stamps
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
@@ -12,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import PLACE_INDEX, import_sequence, open_sequence
-from adversarial_lcd_ros.sequences.bagfile import BagFile
+from adversarial_lcd_ros.sequences.bagfile import BagFile, BagWriter
 
 TOUR = Path(__file__).resolve().parents[1] / 'bags' / 'flat_tour'
 PLUGINS = pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
@@ -181,6 +184,45 @@ def test_truncated_ros1_bag_is_refused(tmp_path, share):
         open_sequence(tmp_path / 'tum.bag')
 
 
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory):
+    """Return one bag of every kind."""
+    folder = tmp_path_factory.mktemp('whole')
+    rows = make.jpeg_rows() + make.pose_rows()
+    tum_bag(folder / 'tum.bag')
+    return {'ros1': folder / 'tum.bag', 'mcap': make.write_ros2(folder / 'mcap', rows),
+            'sqlite3': make.write_ros2(folder / 'sqlite3', rows, StoragePlugin.SQLITE3)}
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+@pytest.mark.parametrize('kind', ['ros1', 'mcap', 'sqlite3'])
+def test_damage_anywhere_gives_no_other_error(whole, tmp_path_factory, kind, data):
+    bag = tmp_path_factory.mktemp('damaged') / whole[kind].name
+    (shutil.copytree if whole[kind].is_dir() else shutil.copy)(whole[kind], bag)
+    files = sorted(bag.iterdir()) if bag.is_dir() else [bag]
+    file = data.draw(st.sampled_from(files), 'file')
+    content = bytearray(file.read_bytes())
+    places = st.integers(0, len(content) - 1)
+    for place, value in data.draw(st.lists(st.tuples(places, st.integers(0, 255)), min_size=1,
+                                           max_size=8), 'damage'):
+        content[place] = value
+    file.write_bytes(content)
+    try:
+        found = [frame.image().shape for frame in open_sequence(bag).frames()]
+    except SequenceError:
+        return
+    assert found == [(make.HEIGHT, make.WIDTH, 3)] * 4
+
+
+def test_metadata_that_are_no_numbers_are_refused(tmp_path):
+    bag = make.write_ros2(tmp_path / 'bag', make.raw_rows())
+    text = (bag / 'metadata.yaml').read_text()
+    (bag / 'metadata.yaml').write_text(text.replace('message_count: 4', 'message_count: four'))
+    with pytest.raises(SequenceError, match=r'cannot be read'):
+        open_sequence(bag)
+
+
 def test_messages_missing_from_a_database_are_noticed(tmp_path):
     bag = make.write_ros2(tmp_path / 'bag', make.raw_rows(), StoragePlugin.SQLITE3)
     with sqlite3.connect(storage(bag)) as database:
@@ -268,6 +310,16 @@ def test_import_of_raw_images_without_ground_truth(tmp_path):
         assert np.abs(frame.image().astype(int) - picture(k)).mean() < 4
 
 
+def test_raw_images_as_png_lose_nothing(tmp_path):
+    bag = make.write_ros2(tmp_path / 'raw', make.raw_rows())
+    import_sequence(bag, tmp_path / 'bag', raw_as='png')
+    for k, frame in enumerate(open_sequence(tmp_path / 'bag').frames()):
+        assert frame.encoding == 'png'
+        np.testing.assert_array_equal(frame.image(), picture(k))
+    with pytest.raises(SequenceError, match=r"raw images as 'webp'"):
+        import_sequence(bag, tmp_path / 'other', raw_as='webp')
+
+
 def test_import_keeps_ground_truth_of_the_frames_only(tmp_path):
     source = make.tum_folder(tmp_path / 'tum')
     times = [make.START_NS + k * 50_000_000 for k in range(-10, 20)]
@@ -317,6 +369,38 @@ def test_existing_destinations_are_kept(tmp_path):
     import_sequence(make.tum_folder(tmp_path / 'third', count=3), tmp_path / 'bag',
                     overwrite=True)
     assert open_sequence(tmp_path / 'bag').frame_count == 3
+
+
+def test_a_bag_is_kept_where_its_successor_cannot_take_its_place(tmp_path, monkeypatch):
+    bag = make.write_ros2(tmp_path / 'bag', make.jpeg_rows())
+    rename = Path.rename
+
+    def refuse(path, target):
+        if path.parent.name.endswith('.partial'):
+            raise OSError('no')
+        return rename(path, target)
+
+    writer = BagWriter(bag, overwrite=True)
+    monkeypatch.setattr(Path, 'rename', refuse)
+    with pytest.raises(SequenceError, match=r'bag .* cannot be written: no'):
+        writer.close()
+    assert [path.name for path in tmp_path.iterdir()] == ['bag']
+    assert open_sequence(bag).frame_count == 4
+
+
+def test_a_bag_that_came_into_being_meanwhile_is_kept(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    make.write_ros2(tmp_path / 'bag', make.jpeg_rows())
+    with pytest.raises(SequenceError, match=r'exists already'):
+        writer.close()
+    assert [path.name for path in tmp_path.iterdir()] == ['bag']
+    assert open_sequence(tmp_path / 'bag').frame_count == 4
+
+
+def test_places_that_cannot_be_written_are_named(tmp_path):
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(SequenceError, match=r'file/bag cannot be written'):
+        BagWriter(tmp_path / 'file' / 'bag')
 
 
 def test_a_frame_of_another_size_stops_an_import(tmp_path):

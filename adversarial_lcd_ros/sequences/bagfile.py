@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import Reader as Reader2
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
+from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, join_ns
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -36,7 +37,6 @@ ROS2_SUFFIXES = ('.mcap', '.db3')
 METADATA = 'metadata.yaml'
 _NS = 1_000_000_000
 _BAG_VERSION: Literal[9] = 9
-_CDR_HEADER = 4  # bytes of encapsulation, then the stamp of a std_msgs/Header
 
 
 def is_bag(path: Path) -> bool:
@@ -101,11 +101,11 @@ class BagFile:
         with _explained(path):
             self._reader: Any = Reader1(path) if self.is_ros1 else Reader2(path)
             self._reader.open()
-        connections: Sequence[Connection] = self._reader.connections
-        self.topics = {entry.topic: entry.msgtype for entry in connections}
-        self.counts = dict.fromkeys(self.topics, 0)
-        for entry in connections:
-            self.counts[entry.topic] += entry.msgcount
+            connections: Sequence[Connection] = self._reader.connections
+            self.topics = {entry.topic: entry.msgtype for entry in connections}
+            self.counts = dict.fromkeys(self.topics, 0)
+            for entry in connections:
+                self.counts[entry.topic] += entry.msgcount
 
     def __enter__(self) -> Self:
         return self
@@ -117,7 +117,8 @@ class BagFile:
     @property
     def duration_s(self) -> float:
         """Time from the first message to the last, seconds; 0 without messages."""
-        return float(self._reader.duration) / _NS if any(self.counts.values()) else 0.0
+        with _explained(self.path):
+            return float(self._reader.duration) / _NS if any(self.counts.values()) else 0.0
 
     def of_type(self, *types: str) -> list[str]:
         """Return the topics that hold messages of these types, sorted."""
@@ -160,44 +161,7 @@ class BagFile:
         if len(wire) < 12:
             raise SequenceError(f'bag {self.path}: a message of {len(wire)} bytes has no header')
         _, seconds, nanoseconds = struct.unpack_from('<III', wire)
-        return _join(seconds, nanoseconds)
-
-
-def _join(seconds: int, nanoseconds: int) -> int:
-    if not 0 <= nanoseconds < _NS:
-        raise SequenceError(f'stamp with {nanoseconds} nanoseconds: expected below {_NS}')
-    return seconds * _NS + nanoseconds
-
-
-def _time_format(cdr: bytes) -> str:
-    if len(cdr) < _CDR_HEADER + 8 or cdr[0] != 0 or cdr[1] not in (0, 1):
-        raise SequenceError(f'{len(cdr)} bytes starting with {cdr[:4].hex() or "nothing"} are no '
-                            'CDR of a message with a header')
-    return '<iI' if cdr[1] else '>iI'
-
-
-def cdr_stamp_ns(cdr: bytes) -> int:
-    """Return the stamp of the header that a message in CDR starts with; raises SequenceError."""
-    return _join(*struct.unpack_from(_time_format(cdr), cdr, _CDR_HEADER))
-
-
-def with_cdr_stamp(cdr: bytes, stamp_ns: int) -> bytes:
-    """Return a message in CDR that starts with a header, with another stamp in it."""
-    seconds, nanoseconds = divmod(stamp_ns, _NS)
-    if seconds >= 2**31:
-        raise SequenceError(f'{stamp_ns} ns is beyond the stamps of ROS 2, which end in 2038')
-    changed = bytearray(cdr)
-    struct.pack_into(_time_format(cdr), changed, _CDR_HEADER, seconds, nanoseconds)
-    return bytes(changed)
-
-
-def header(stamp_ns: int, frame_id: str) -> Any:
-    """Return a std_msgs/Header."""
-    types: Any = typestore().types
-    seconds, nanoseconds = divmod(stamp_ns, _NS)
-    return types['std_msgs/msg/Header'](
-        stamp=types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds),
-        frame_id=frame_id)
+        return join_ns(seconds, nanoseconds)
 
 
 class BagWriter:
@@ -210,51 +174,70 @@ class BagWriter:
     Raises
     ------
     SequenceError
-        The destination exists: without ``overwrite`` always, with it if it is no bag.
+        The destination exists (without ``overwrite`` always, with it if it is no bag), also
+        where it has come into being by the time of ``close``; or it cannot be written.
 
     """
 
     def __init__(self, destination: Path, *, overwrite: bool = False) -> None:
-        self._destination = destination.absolute()
+        self._destination, self._overwrite = destination.resolve(), overwrite
         _check_free(self._destination, overwrite)
-        try:
+        with self._written():
             self._destination.parent.mkdir(parents=True, exist_ok=True)
             # mkdtemp makes a name of its own: two imports at once do not meet.
             self._folder = Path(tempfile.mkdtemp(
                 prefix=f'.{self._destination.name}.', suffix='.partial',
                 dir=self._destination.parent))
-        except OSError as error:
-            raise SequenceError(f'{destination} cannot be written: {error}') from error
-        # The MCAP file is named after its folder: the right name is one level further down.
-        self._writer = Writer(self._folder / self._destination.name, version=_BAG_VERSION,
-                              storage_plugin=StoragePlugin.MCAP)
-        self._writer.open()
+            # The MCAP file is named after its folder: the right name is one level further down.
+            self._writer = Writer(self._folder / self._destination.name, version=_BAG_VERSION,
+                                  storage_plugin=StoragePlugin.MCAP)
+            self._writer.open()
         self._is_open = True
         self._connections: dict[str, Connection] = {}
 
     def write(self, topic: str, message_type: str, stamp_ns: int, cdr: bytes) -> None:
-        """Write a message in CDR."""
-        connection = self._connections.get(topic)
-        if connection is None:
-            connection = self._connections[topic] = self._writer.add_connection(
-                topic, message_type, typestore=typestore())
-        self._writer.write(connection, stamp_ns, cdr)
+        """Write a message in CDR; its definition goes into the bag with the first of a topic."""
+        with self._written():
+            connection = self._connections.get(topic)
+            if connection is None:
+                connection = self._connections[topic] = self._writer.add_connection(
+                    topic, message_type, typestore=typestore())
+            self._writer.write(connection, stamp_ns, cdr)
+
+    def note(self, key: str, text: str) -> None:
+        """Put a text into the metadata (custom_data), both beside the MCAP file and inside it."""
+        self._writer.set_custom_data(key, text)
 
     def attach(self, file: Path) -> None:
         """Put a copy of a file beside the bag's own."""
-        shutil.copyfile(file, self._writer.path / file.name)
+        with self._written():
+            shutil.copyfile(file, self._writer.path / file.name)
 
     def close(self) -> None:
         """Complete the bag and move it to its place; where that fails, throw it away."""
         try:
-            self._stop(None)
-            if self._destination.exists():
-                self._destination.rename(self._folder / 'replaced')
-            (self._folder / self._destination.name).rename(self._destination)
+            with self._written():
+                self._stop(None)
+                _check_free(self._destination, self._overwrite)
+                self._move()
         except BaseException:
             self.abort()
             raise
         shutil.rmtree(self._folder)
+
+    def _move(self) -> None:
+        # Folders cannot be exchanged in one step: the old bag waits beside until the new one is
+        # there, and goes back if that fails.
+        replaced = self._folder.with_suffix('.replaced')
+        try:
+            if self._destination.exists():
+                self._destination.rename(replaced)
+            (self._folder / self._destination.name).rename(self._destination)
+        except BaseException:
+            if replaced.exists():
+                replaced.rename(self._destination)
+            raise
+        shutil.rmtree(replaced, ignore_errors=True)
 
     def abort(self) -> None:
         """Throw the half-written bag away."""
@@ -268,6 +251,13 @@ class BagWriter:
         if self._is_open:
             self._is_open = False
             self._writer.__exit__(None if error is None else type(error), error, None)
+
+    @contextmanager
+    def _written(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, WriterError) as error:
+            raise SequenceError(f'bag {self._destination} cannot be written: {error}') from error
 
     def __enter__(self) -> Self:
         return self

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,10 @@ def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None)
         size = _size(message, _what(path, chosen, 0))
         trajectory = _trajectory(bag, ground_truth, message.header.frame_id)
 
-    def read() -> Iterator[Frame]:
+    def read(wanted: range) -> Iterator[Frame]:
         with BagFile(path) as source:
-            for number, (_, _, wire) in enumerate(source.messages([chosen])):
+            messages = islice(source.messages([chosen]), wanted.start, wanted.stop, wanted.step)
+            for number, (_, _, wire) in zip(wanted, messages, strict=False):
                 yield _frame(source.decode(chosen, wire), _what(path, chosen, number), size)
 
     return Sequence(path.resolve().stem, path, stamps, size, trajectory, read)

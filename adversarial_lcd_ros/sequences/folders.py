@@ -78,7 +78,7 @@ def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None)
         if len(trajectory) != len(paths):
             raise SequenceError(
                 f'{folder} holds {len(paths)} images, {ground_truth} {len(trajectory)} poses: '
-                'expected one pose per image, or the rate of the images in Hz')
+                'expected one pose per image, or the rate of the images in Hz, or "none"')
         return _sequence(folder, paths, trajectory.stamp_ns, trajectory)
     start_ns = 0 if trajectory is None else int(trajectory.stamp_ns[0])
     return _sequence(folder, paths, start_ns + _ticks(len(paths), rate_hz), trajectory)
@@ -152,9 +152,9 @@ def _sequence(folder: Path, paths: list[Path], stamps: list[int] | NDArray[np.in
     size = first.width, first.height
     stamps_ns = np.asarray(stamps, np.int64)
 
-    def read() -> Iterator[Frame]:
-        for path, stamp_ns in zip(paths, stamps_ns, strict=True):
-            yield _open(path, int(stamp_ns), size)
+    def read(wanted: range) -> Iterator[Frame]:
+        for number in wanted:
+            yield _open(paths[number], int(stamps_ns[number]), size)
 
     return Sequence(folder.resolve().name, folder, stamps_ns, size, trajectory, read)
 

@@ -13,8 +13,10 @@ from adversarial_lcd_ros.errors import SequenceError
 JPEG, PNG = 'jpeg', 'png'
 RAW_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 JPEG_QUALITY = 95
+_WRITE_OPTIONS = {JPEG: [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY], PNG: []}
 _MAGIC = {JPEG: b'\xff\xd8\xff', PNG: b'\x89PNG\r\n\x1a\n'}
-_END = {JPEG: b'\xff\xd9', PNG: b'IEND\xaeB`\x82'}
+_PNG_END = b'IEND\xaeB`\x82'
+_JPEG_SCAN, _JPEG_END = 0xDA, b'\xff\xd9'
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,21 @@ class Frame:
                 'size')
         return pixels
 
-    def jpeg(self, quality: int = JPEG_QUALITY) -> Frame:
-        """Return the frame as a JPEG; a JPEG or PNG is returned as it is."""
+    def compressed(self, encoding: str = JPEG) -> Frame:
+        """
+        Return the frame as a JPEG of quality 95, or as a PNG, which keeps every pixel.
+
+        A frame that is a JPEG or PNG already is returned as it is, whatever is asked for.
+        """
         if self.encoding not in RAW_CHANNELS:
             return self
-        # cv2 knows grey by its shape; a grey JPEG is a third smaller and loses nothing.
+        # cv2 knows grey by its shape; a grey file is smaller and loses nothing.
         pixels = self.image() if RAW_CHANNELS[self.encoding] == 3 else self.image()[:, :, 0]
-        done, data = cv2.imencode('.jpg', pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+        done, data = cv2.imencode(f'.{encoding}', pixels, _WRITE_OPTIONS[encoding])
         if not done:
-            raise SequenceError(f'frame at {self.stamp_ns} ns: OpenCV cannot write it as a JPEG')
-        return Frame(self.stamp_ns, data.tobytes(), JPEG, self.width, self.height)
+            raise SequenceError(f'frame at {self.stamp_ns} ns: OpenCV cannot write it as '
+                                f'{encoding.upper()}')
+        return Frame(self.stamp_ns, data.tobytes(), encoding, self.width, self.height)
 
     def _raw_pixels(self) -> NDArray[np.uint8]:
         channels = RAW_CHANNELS[self.encoding]
@@ -88,10 +95,10 @@ class Frame:
 
 def compressed_encoding(data: bytes, what: str) -> str:
     """
-    Return 'jpeg' or 'png', by the first and last bytes of an image file.
+    Return 'jpeg' or 'png', by the first bytes of an image file and its end marker.
 
-    Some versions of OpenCV fill up a truncated image with grey and only warn: hence the look at
-    the end. Cameras may pad a JPEG with zeros.
+    Some versions of OpenCV fill up a truncated image with grey and only warn: hence the look
+    for the end. Behind it, cameras put padding and data of their own.
 
     Raises
     ------
@@ -101,12 +108,23 @@ def compressed_encoding(data: bytes, what: str) -> str:
     """
     for encoding, magic in _MAGIC.items():
         if data.startswith(magic):
-            if not data.rstrip(b'\0').endswith(_END[encoding]):
+            is_whole = _has_jpeg_end(data) if encoding == JPEG else _PNG_END in data
+            if not is_whole:
                 raise SequenceError(f'{what} is a truncated {encoding.upper()} of {len(data)} '
                                     'bytes: get the sequence again')
             return encoding
     raise SequenceError(f'{what}: {len(data)} bytes that start with {data[:4].hex() or "nothing"} '
                         'are neither a JPEG nor a PNG')
+
+
+def _has_jpeg_end(data: bytes) -> bool:
+    # Inside the scan the marker cannot occur, but in the segments before it, where thumbnails
+    # have ends of their own: step over these, from length to length.
+    at = 2
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != _JPEG_SCAN:
+        is_fill = data[at + 1] == 0xFF
+        at += 1 if is_fill else 2 + int.from_bytes(data[at + 2:at + 4], 'big')
+    return data.rfind(_JPEG_END) >= at
 
 
 def decode(data: bytes, what: str) -> NDArray[np.uint8]:

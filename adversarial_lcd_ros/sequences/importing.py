@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from adversarial_lcd_ros.codec import typestore
-from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter, header
-from adversarial_lcd_ros.sequences.frame import Frame
+from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter
+from adversarial_lcd_ros.sequences.cdr import header
+from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
@@ -40,14 +42,15 @@ class ImportSummary:
 def import_sequence(source: Path | str, destination: Path | str, *,
                     progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
                     topic: str | None = None, ground_truth: Path | str | None = None,
-                    rate_hz: float | None = None) -> ImportSummary:
+                    rate_hz: float | None = None, raw_as: str = JPEG) -> ImportSummary:
     """
     Write a sequence as a rosbag2 in MCAP.
 
     Frames become sensor_msgs/CompressedImage on /image/compressed: JPEG and PNG files with
-    their bytes untouched, raw images as JPEG of quality 95. Every frame is decoded once, as a
-    check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. Credits and licence
-    files of a source folder go with the pictures. The same source always gives the same bytes.
+    their bytes untouched, raw images as JPEG of quality 95 or as PNG. Every frame is decoded
+    once, as a check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. Credits
+    and licence files of a source folder go with the pictures. With one release of rosbags, the
+    same source always gives the same bytes.
 
     Parameters
     ----------
@@ -59,6 +62,8 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         Called with (frames done, frames in all).
     overwrite : bool
         Replace a bag that is there.
+    raw_as : str
+        What raw images become: 'jpeg', or 'png', which is several times larger and exact.
 
     Raises
     ------
@@ -67,11 +72,13 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         is of another size, or the destination exists.
 
     """
+    if raw_as not in (JPEG, PNG):
+        raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
         sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz)
         poses = None if sequence.trajectory is None else sequence.trajectory.between(
             int(sequence.stamps_ns[0]) - _MARGIN_NS, int(sequence.stamps_ns[-1]) + _MARGIN_NS)
-        frames = _counted(sequence.frames(), sequence.frame_count, progress)
+        frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
         # At the same time, the pose comes first: the key sorts by nothing else.
         for message_topic, message_type, stamp_ns, cdr in heapq.merge(
                 _pose_messages(poses), map(_image_message, frames), key=lambda row: row[2]):
@@ -92,11 +99,11 @@ def _terms(source: Path) -> list[Path]:
             if path.is_file() and path.stem.lower() in _TERMS]
 
 
-def _counted(frames: Iterator[Frame], total: int,
+def _counted(frames: Iterator[Frame], total: int, raw_as: str,
              progress: Callable[[int, int], None] | None) -> Iterator[Frame]:
     for done, frame in enumerate(frames, 1):
         frame.image()
-        yield frame.jpeg()
+        yield frame.compressed(raw_as)
         if progress is not None:
             progress(done, total)
 

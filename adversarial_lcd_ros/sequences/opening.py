@@ -68,8 +68,14 @@ def _image_folder(path: Path, ground_truth: Path | str | None,
     if folders.is_seven_scenes(path):
         _refuse(path, ground_truth=_file(ground_truth))
         return _without_truth(folders.seven_scenes(path, rate_hz), ground_truth)
+    beside = path / folders.TUM_TRUTH
     if folders.images_in(path):
-        return folders.image_folder(path, _file(ground_truth), rate_hz)
+        poses = beside if ground_truth is None and beside.is_file() else _file(ground_truth)
+        return folders.image_folder(path, poses, rate_hz)
+    if beside.is_file():
+        raise SequenceError(
+            f'{path} has a {folders.TUM_TRUTH} but no {folders.TUM_IMAGES}, which lists the '
+            'images and their stamps: get the sequence again, or open its folder of images')
     walks = folders.walks_in(path)
     if walks:
         _refuse(path, ground_truth=_file(ground_truth))

@@ -31,7 +31,7 @@ class Sequence:
     trajectory : Trajectory or None
         Ground truth; None where the source has none.
     read : callable
-        Returns an iterator of all frames; use ``frames``.
+        Returns an iterator of the frames of these numbers; use ``frames``.
 
     Raises
     ------
@@ -45,7 +45,7 @@ class Sequence:
     stamps_ns: NDArray[np.int64]
     image_size: tuple[int, int]
     trajectory: Trajectory | None
-    read: Callable[[], Iterator[Frame]]
+    read: Callable[[range], Iterator[Frame]]
 
     def __post_init__(self) -> None:
         """Check the order of the frames, and that the ground truth is theirs."""
@@ -62,25 +62,39 @@ class Sequence:
         """Number of frames."""
         return len(self.stamps_ns)
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self, start: int = 0, stop: int | None = None, stride: int = 1,
+               ) -> Iterator[Frame]:
         """
-        Yield the frames in order.
+        Yield the frames in order, all of them or those that a slice would choose.
+
+        What is left out is not decoded, and from folders not read.
+
+        Parameters
+        ----------
+        start, stop, stride : int
+            First frame, the one after the last (None: to the end), and every how many frames
+            one is taken. Not negative; a stop beyond the end is the end.
 
         Raises
         ------
         SequenceError
-            A frame is missing or truncated, or the source has changed since it was opened.
+            A frame is missing or truncated, the source has changed since it was opened, or no
+            such slice can be taken.
 
         """
+        if start < 0 or stride < 1 or (stop is not None and stop < 0):
+            raise SequenceError(f'frames from {start} to {stop}, every {stride}: expected a '
+                                'start and a stop of 0 or more, and a stride of 1 or more')
+        wanted = range(self.frame_count)[start:stop:stride]
         count = 0
-        for frame in self.read():
-            if count >= self.frame_count or frame.stamp_ns != self.stamps_ns[count]:
+        for number, frame in zip(wanted, self.read(wanted), strict=False):
+            if frame.stamp_ns != self.stamps_ns[number]:
                 raise SequenceError(f'{self.source} has changed since it was opened')
             count += 1
             yield frame
-        if count != self.frame_count:
-            raise SequenceError(f'{self.source} is truncated: {count} of {self.frame_count} '
-                                'frames could be read')
+        if count != len(wanted):
+            raise SequenceError(f'{self.source} is truncated: {count} of {len(wanted)} frames '
+                                'could be read')
 
 
 def check_order(stamps_ns: list[int] | NDArray[np.int64], source: Path) -> NDArray[np.int64]:
