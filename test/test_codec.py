@@ -29,7 +29,7 @@ def test_graph_round_trip(graph, stamp_ns, frame_id, sequence):
 
 
 @given(st.builds(codec.LoopClosure, stamps, text, uint32, st.booleans(), chance, st.none(),
-                 st.none(), st.floats(0, 1, width=32), uint32),
+                 st.none(), chance, uint32),
        stamps, uint32, st.booleans())
 def test_loop_closure_round_trip(decision, match_ns, match_sequence, matched):
     if matched:
