@@ -243,7 +243,13 @@ def test_terminal_tables(summary):
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(tables.decline_table(summary))
     console.print(tables.figure_table(summary))
-    assert 'random walk + SVM-RBF, surrogate only' in console.export_text()
+    shown = console.export_text()
+    assert all(attack['name'] in shown for attack in summary['attacks'])
+
+
+def test_an_attack_without_a_name_is_told_by_its_settings(summary):
+    attack = {**summary['attacks'][1], 'name': ''}
+    assert wording.attack_title(attack) == 'random walk + SVM-RBF, surrogate only'
 
 
 def test_latest_changes_only_when_the_folder_is_complete(folder, tmp_path):
