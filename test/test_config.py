@@ -9,8 +9,12 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
+from adversarial_lcd_ros import config
+from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS
+from adversarial_lcd_ros.attack.surrogates import SURROGATES
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.settings import (
     NODE_CONFIGS,
     SECTIONS,
@@ -166,3 +170,9 @@ def test_nodes_take_params_yaml_in_any_namespace(namespace):
     defaults = {entry.name: entry.default for config in NODE_CONFIGS['attacker']
                 for entry in fields(config)}
     assert {name: found.get(name) for name in defaults} == defaults
+
+
+def test_choices_are_the_tables():
+    assert set(config.TARGETS) == set(TARGETS)
+    assert set(config.SURROGATES) == {*SURROGATES, 'none'}
+    assert set(config.PERTURBATIONS) == {*PERTURBATIONS, 'recall'}
