@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
-from adversarial_lcd_ros import config
+from adversarial_lcd_ros import config as settings_of
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS
 from adversarial_lcd_ros.attack.surrogates import SURROGATES
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, Config, LabelConfig, LcdConfig
@@ -173,6 +173,6 @@ def test_nodes_take_params_yaml_in_any_namespace(namespace):
 
 
 def test_choices_are_the_tables():
-    assert set(config.TARGETS) == set(TARGETS)
-    assert set(config.SURROGATES) == {*SURROGATES, 'none'}
-    assert set(config.PERTURBATIONS) == {*PERTURBATIONS, 'recall'}
+    assert set(settings_of.TARGETS) == set(TARGETS)
+    assert set(settings_of.SURROGATES) == {*SURROGATES, 'none'}
+    assert set(settings_of.PERTURBATIONS) == {*PERTURBATIONS, 'recall'}
