@@ -30,7 +30,7 @@ _FONT = cv2.FONT_HERSHEY_SIMPLEX
 # Coordinates of lines are handed over in 1/16 pixel.
 _SHIFT = 4
 _DASH, _GAP = 7.0, 5.0
-_PANEL_WIDTH, _PANEL_HEIGHT = 480, 360
+_PANEL_WIDTH, _PANEL_HEIGHT, _PANEL_GAP = 476, 360, 6
 _TEXT_HEIGHT = 30
 
 
@@ -83,7 +83,7 @@ def draw_graph(image: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayLike
         _segments(canvas, _dashes(first, second), _FLIPPED, 2)
     _segments(canvas, position[pairs[is_added]], _FLIPPED, 2)
     for x, y in np.rint(position[np.unique(pairs)]).astype(int).tolist():
-        cv2.circle(canvas, (x, y), 4, _FLIPPED, -1, cv2.LINE_AA)
+        cv2.circle(canvas, (x, y), 3, _FLIPPED, -1, cv2.LINE_AA)
     _draw_objects(canvas, graph, classes, scale)
     if legend:
         _draw_legend(canvas, graph, None if flips is None else is_added)
@@ -125,10 +125,13 @@ def draw_attack(query: NDArray[np.uint8], clean: MultiTierGraph, match: NDArray[
     flips = clean.flips_to(perturbed)
     panels = [('query', _panel(query, clean)), ('match', _panel(match, match_graph)),
               ('attacked graph', _panel(query, perturbed, flips))]
-    columns = [np.vstack([_strip(title, _PANEL_WIDTH), panel]) for title, panel in panels]
-    rows = [np.hstack(columns)]
+    gap = np.full((_TEXT_HEIGHT + _PANEL_HEIGHT, _PANEL_GAP, 3), _PAPER, np.uint8)
+    columns = [gap]
+    for title, panel in panels:
+        columns += [np.vstack([_strip(title, _PANEL_WIDTH), panel]), gap]
+    rows = [np.hstack(columns[1:-1])]
     if caption:
-        rows.append(_strip(caption, 3 * _PANEL_WIDTH))
+        rows.append(_strip(caption, rows[0].shape[1]))
     return np.asarray(np.vstack(rows), np.uint8)
 
 
