@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
+from sklearn.metrics import balanced_accuracy_score
 from sklearn.preprocessing import StandardScaler
 
 from adversarial_lcd_ros.errors import ModelError
@@ -113,7 +114,8 @@ def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_windo
     """
     Return a logistic decision on the square roots of the target's scores.
 
-    Loops and others weigh the same, whatever their numbers, and so do sequences.
+    Loops and others weigh the same, whatever their numbers, and so do sequences. The card gets
+    the balanced accuracy on the training pairs of each sequence.
 
     Raises
     ------
@@ -139,5 +141,7 @@ def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_windo
     model.fit(scaler.transform(roots), np.concatenate(labels), weight * len(weight) / weight.sum())
     slope = model.coef_[0] / scaler.scale_
     bias = float(model.intercept_[0] - slope @ scaler.mean_)
-    return Decision(target.name, target.channels, tuple(float(value) for value in slope), bias,
-                    dict(card or {}))
+    decision = Decision(target.name, target.channels, tuple(float(value) for value in slope), bias)
+    accuracy = [float(balanced_accuracy_score(is_loop, decision.logit(scores) >= 0))
+                for scores, is_loop in zip(rows, labels, strict=True)]
+    return replace(decision, card={**(card or {}), 'training_balanced_accuracy': accuracy})

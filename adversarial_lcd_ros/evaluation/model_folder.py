@@ -1,0 +1,82 @@
+"""A folder of trained artefacts: complete with its card, or not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import hashlib
+from pathlib import Path
+import tempfile
+from typing import Any
+
+from adversarial_lcd_ros.errors import ModelError
+
+VOCABULARY, SURROGATE_DATA, MODEL_CARD = 'vocabulary.npz', 'surrogate_data.npz', 'MODEL_CARD.json'
+_TARGET = 'target_{}.json'
+_OURS = (VOCABULARY, SURROGATE_DATA, MODEL_CARD, _TARGET.format('*'))
+
+
+def decision_file(target: str) -> str:
+    """Return the name of the file with the decision of a target."""
+    return _TARGET.format(target)
+
+
+@contextmanager
+def model_folder(output: Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """
+    Yield a hidden folder to fill, which takes its place when the block ends without an error.
+
+    Parameters
+    ----------
+    output : Path
+        Where it is to be.
+    overwrite : bool
+        Replace the artefacts of an earlier training; other files of the folder stay.
+
+    Raises
+    ------
+    ModelError
+        The folder is there and not empty (without ``overwrite``), or cannot be written.
+
+    """
+    output = output.resolve()
+    _check_free(output, overwrite)
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f'.{output.name}.', suffix='.partial',
+                                         dir=output.parent) as hidden:
+            # The temporary folder is its owner's alone; the one below has the usual mode.
+            work = Path(hidden) / output.name
+            work.mkdir()
+            yield work
+            _check_free(output, overwrite)
+            _move(work, output)
+    except OSError as error:
+        raise ModelError(f'{output} cannot be written: {error}') from error
+
+
+def _check_free(output: Path, overwrite: bool) -> None:
+    if output.exists() and not output.is_dir():
+        raise ModelError(f'{output} is a file: expected a folder, or nothing')
+    if not overwrite and output.is_dir() and any(output.iterdir()):
+        raise ModelError(f'{output} exists already: choose another folder, or replace the '
+                         'artefacts in it with --overwrite')
+
+
+def _move(work: Path, output: Path) -> None:
+    if not output.exists():
+        work.rename(output)
+        return
+    # The card goes first and comes last: as long as it is there, all files belong together.
+    (output / MODEL_CARD).unlink(missing_ok=True)
+    for old in [file for pattern in _OURS for file in output.glob(pattern)]:
+        old.unlink()
+    for made in sorted(work.iterdir(), key=lambda file: file.name == MODEL_CARD):
+        made.replace(output / made.name)
+
+
+def file_digests(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return size and SHA-256 of every file of a folder, by name."""
+    return {file.name: {'bytes': file.stat().st_size,
+                        'sha256': hashlib.sha256(file.read_bytes()).hexdigest()}
+            for file in sorted(folder.iterdir())}
