@@ -141,13 +141,13 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
         word=bow[0], word_weight=bow[1])
 
 
-def _spokes(position: NDArray[np.float32], box: NDArray[np.float32], centre: NDArray[np.float32],
-            first: int) -> NDArray[np.int64]:
+def _spokes(position: NDArray[np.float32], box: NDArray[np.float32],
+            centre: NDArray[np.floating], first: int) -> NDArray[np.int64]:
     """Return the edges (object, feature), features counted from ``first``, shape (e, 2)."""
     if not len(box) or not len(position):
         return np.zeros((0, 2), np.int64)
     offset = position[:, None] - box[None, :, :2]
-    inside = ((offset >= 0) & (offset <= box[None, :, 2:])).all(axis=2)
+    inside = np.all((offset >= 0) & (offset <= box[None, :, 2:]), axis=2)
     lost = ~inside.any(axis=1)
     distance = np.linalg.norm(position[lost, None] - centre[None], axis=2)
     inside[lost, distance.argmin(axis=1)] = True

@@ -60,7 +60,7 @@ class FeatureExtractor:
     """
 
     def __init__(self, count: int, fast_threshold: int) -> None:
-        self._orb = cv2.ORB_create(nfeatures=count, fastThreshold=fast_threshold)
+        self._orb = cv2.ORB.create(nfeatures=count, fastThreshold=fast_threshold)
 
     def extract(self, grey: NDArray[np.uint8]) -> Features:
         """Return the features of a grey image, uint8 (h, w), strongest first."""
@@ -68,7 +68,7 @@ class FeatureExtractor:
         if not keypoints:
             return Features(np.zeros((0, 2), np.float32), np.zeros(0, np.float32),
                             np.zeros(0, np.float32), np.zeros((0, DESCRIPTOR_BYTES), np.uint8))
-        features = Features(cv2.KeyPoint.convert(keypoints).astype(np.float32),
+        features = Features(np.asarray(cv2.KeyPoint.convert(keypoints), np.float32),
                             np.array([keypoint.size for keypoint in keypoints], np.float32),
                             np.array([keypoint.response for keypoint in keypoints], np.float32),
                             descriptor)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import json
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.paths import cache_folder
 
-IMAGENET_MEAN = (0.485, 0.456, 0.406)
-IMAGENET_DEVIATION = (0.229, 0.224, 0.225)
+# RGB, for grey levels from 0 to 1.
+IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
+IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 NMS_IOU = 0.45
 LETTERBOX_GREY = 114
 
@@ -93,7 +95,7 @@ def filter_objects(found: Detections, width: int, height: int,
     Dropped are those whose area is out of bounds or whose centre is too near the border.
     """
     area = found.box[:, 2] * found.box[:, 3] / (width * height)
-    centre = (found.box[:, :2] + found.box[:, 2:] / 2) / np.float32([width, height])
+    centre = (found.box[:, :2] + found.box[:, 2:] / 2) / np.array([width, height], np.float32)
     margin = config.border_margin
     kept = ((area >= config.min_object_area) & (area <= config.max_object_area)
             & (centre >= margin).all(axis=1) & (centre <= 1 - margin).all(axis=1))
@@ -105,8 +107,9 @@ class ObjectDetector:
     Runs an object model whose kind it reads off the model's inputs and outputs.
 
     Understood are PaddleDetection exports (inputs image and scale_factor; rows of class, score,
-    x1, y1, x2, y2) and exports of the YOLO family: a raw head (1, 4 + classes, boxes), or
-    (1, boxes, 6) with suppression inside (rows of x1, y1, x2, y2, score, class).
+    x1, y1, x2, y2) and exports of the YOLO family, version 8 and later: a raw head
+    (1, 4 + classes, boxes), or (1, boxes, 6) with suppression inside (rows of x1, y1, x2, y2,
+    score, class). The size of the input must be fixed, or be named in the model's metadata.
 
     Parameters
     ----------
@@ -125,6 +128,7 @@ class ObjectDetector:
     """
 
     def __init__(self, model: Path, score: float, threads: int = 0) -> None:
+        self._model = model
         self._score = score
         if not model.is_file():
             raise ModelError(f'no object model at {model}: run "adversarial-lcd fetch-model", or '
@@ -139,84 +143,128 @@ class ObjectDetector:
                 str(model), options, providers=['CPUExecutionProvider'])
         except Exception as error:  # onnxruntime's own classes are private
             raise ModelError(f'{model} cannot be loaded as ONNX: {error}') from error
-        self._inputs = {entry.name: entry.shape for entry in self._session.get_inputs()}
-        self._output = self._session.get_outputs()[0]
-        self._run = self._recognise(model)
+        self._run = self._recognise()
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
-        """Return the objects of a BGR image, uint8 (h, w, 3), above the least confidence."""
+        """
+        Return the objects of an image above the least confidence.
+
+        Parameters
+        ----------
+        image : uint8, (h, w, 3)
+            BGR.
+
+        Raises
+        ------
+        ModelError
+            The network fails.
+
+        """
         return self._run(image)
 
-    def _recognise(self, model: Path) -> Callable[[NDArray[np.uint8]], Detections]:
-        shape = self._output.shape
-        if 'scale_factor' in self._inputs and 'image' in self._inputs:
-            self._size = self._input_size('image', model)
+    def _recognise(self) -> Callable[[NDArray[np.uint8]], Detections]:
+        """Return the method that runs models of this kind."""
+        inputs = {entry.name: entry for entry in self._session.get_inputs()}
+        outputs = self._session.get_outputs()
+        self._output = outputs[0].name
+        shape = outputs[0].shape
+        floats = all(entry.type == 'tensor(float)' for entry in inputs.values())
+        if floats and set(inputs) == {'image', 'scale_factor'}:
+            self._size = self._input_size(inputs['image'].shape)
+            grey = np.arange(256, dtype=np.uint8)[:, None]
+            self._normalised = (grey * (1 / (255 * IMAGENET_DEVIATION))
+                                - IMAGENET_MEAN / IMAGENET_DEVIATION).astype(np.float32)
             return self._paddle
-        if len(self._inputs) == 1 and len(shape) == 3:
-            self._name = next(iter(self._inputs))
-            self._size = self._input_size(self._name, model)
-            return self._yolo_end_to_end if shape[2] == 6 else self._yolo_raw
-        raise ModelError(f'{model}: found inputs {self._inputs} and output {shape}; expected '
-                         'a PaddleDetection or a YOLO export')
+        if floats and len(inputs) == len(outputs) == 1 and len(shape) == 3:
+            (self._input, entry), = inputs.items()
+            self._size = self._input_size(entry.shape)
+            if shape[2] == 6:
+                return self._yolo_end_to_end
+            # Older heads, (1, boxes, 5 + classes), are the other way round.
+            rows, columns = shape[1:]
+            if isinstance(rows, int) and rows > 4 and (
+                    not isinstance(columns, int) or columns > rows):
+                return self._yolo_raw
+        found = ', '.join(f'{entry.name} {entry.type}{entry.shape}'
+                          for entry in (*inputs.values(), *outputs))
+        raise ModelError(f'{self._model}: found {found}; expected a PaddleDetection export '
+                         '(image, scale_factor) or one of YOLOv8 or later, in float32')
 
-    def _input_size(self, name: str, model: Path) -> tuple[int, int]:
-        shape = self._inputs[name]
-        if len(shape) != 4 or not all(isinstance(side, int) for side in shape[2:]):
-            raise ModelError(f'{model}: input {name} has shape {shape}; expected a fixed '
-                             '(batch, 3, height, width)')
-        return int(shape[3]), int(shape[2])
+    def _input_size(self, shape: list[int | str]) -> tuple[int, int]:
+        """Return width and height of the network's input, from its shape or its metadata."""
+        sides: Any = shape[2:]
+        if not _are_sides(sides):
+            named = self._session.get_modelmeta().custom_metadata_map.get('imgsz', '')
+            try:
+                sides = json.loads(named)
+            except ValueError:
+                sides = None
+        if len(shape) != 4 or shape[1] != 3 or not _are_sides(sides):
+            raise ModelError(f'{self._model}: the input has shape {shape}; expected (batch, 3, '
+                             'height, width): export the model with a fixed size')
+        return int(sides[1]), int(sides[0])
+
+    def _infer(self, feed: dict[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        try:
+            found: NDArray[np.float32] = self._session.run([self._output], feed)[0]
+        except Exception as error:  # onnxruntime's own classes are private
+            raise ModelError(f'{self._model} fails on an image: {error}') from error
+        return found
 
     def _paddle(self, image: NDArray[np.uint8]) -> Detections:
         height, width = image.shape[:2]
         columns, rows = self._size
-        resized = cv2.resize(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), self._size,
-                             interpolation=cv2.INTER_CUBIC)
-        scale = 1 / (255 * np.float32(IMAGENET_DEVIATION))
-        offset = np.float32(IMAGENET_MEAN) / np.float32(IMAGENET_DEVIATION)
-        tensor = (resized * scale - offset).transpose(2, 0, 1)[None]
-        rows_found = self._session.run(None, {
-            'image': np.ascontiguousarray(tensor, np.float32),
-            'scale_factor': np.float32([[rows / height, columns / width]])})[0]
-        found = rows_found[rows_found[:, 1] >= self._score]
+        planes = cv2.split(cv2.resize(image, self._size, interpolation=cv2.INTER_CUBIC))
+        # BGR to RGB, and each grey level to its normalised value, in one table look-up.
+        tensor = np.stack([cv2.LUT(plane, self._normalised[:, channel])
+                           for channel, plane in enumerate(reversed(planes))])
+        found = self._infer({'image': tensor[None], 'scale_factor': np.array(
+            [[rows / height, columns / width]], np.float32)})
+        # A row of class -1 stands for "nothing found".
+        found = found[(found[:, 1] >= self._score) & (found[:, 0] >= 0)]
         return Detections.of(found[:, 0], found[:, 2:6], found[:, 1], width, height)
 
-    def _letterboxed(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float, float,
-                                                              float]:
+    def _letterboxed(self, image: NDArray[np.uint8]
+                     ) -> tuple[NDArray[np.float32], float, tuple[int, int]]:
         """Return the output for an image scaled with its aspect kept, the scale and offset."""
         height, width = image.shape[:2]
         columns, rows = self._size
         scale = min(columns / width, rows / height)
-        resized = cv2.resize(image, (round(width * scale), round(height * scale)))
+        resized = cv2.resize(image, (max(round(width * scale), 1),
+                                     max(round(height * scale), 1)))
         left, top = (columns - resized.shape[1]) // 2, (rows - resized.shape[0]) // 2
         canvas = np.full((rows, columns, 3), LETTERBOX_GREY, np.uint8)
         canvas[top:top + resized.shape[0], left:left + resized.shape[1]] = resized
         tensor = cv2.dnn.blobFromImage(canvas, 1 / 255, swapRB=True)
-        return self._session.run(None, {self._name: tensor})[0][0], scale, left, top
+        return self._infer({self._input: tensor})[0], scale, (left, top)
 
     def _yolo_raw(self, image: NDArray[np.uint8]) -> Detections:
-        head, scale, left, top = self._letterboxed(image)
-        scores = head[4:]
-        label = scores.argmax(axis=0)
-        score = scores.max(axis=0)
+        head, scale, offset = self._letterboxed(image)
+        label, score = head[4:].argmax(axis=0), head[4:].max(axis=0)
         sure = np.flatnonzero(score >= self._score)
+        label, score = label[sure], score[sure]
         centre, size = head[:2, sure].T, head[2:4, sure].T
-        box = np.concatenate([centre - size / 2, size], axis=1)
-        kept = np.asarray(cv2.dnn.NMSBoxesBatched(
-            box.tolist(), score[sure].tolist(), label[sure].tolist(), self._score, NMS_IOU),
-            np.int64).ravel()
-        corners = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1)[kept]
-        return self._unboxed(label[sure][kept], corners, score[sure][kept], image, scale,
-                             (left, top))
+        # Classes lie side by side, too far apart to overlap: one is not suppressed by another.
+        apart = centre - size / 2 + 2 * max(self._size) * label[:, None]
+        kept = np.asarray(cv2.dnn.NMSBoxes(np.hstack([apart, size]).tolist(), score.tolist(), 0.0,
+                                           NMS_IOU), np.int64).ravel()
+        corners = np.hstack([centre - size / 2, centre + size / 2])
+        return self._unboxed(label[kept], corners[kept], score[kept], image, scale, offset)
 
     def _yolo_end_to_end(self, image: NDArray[np.uint8]) -> Detections:
-        rows, scale, left, top = self._letterboxed(image)
+        rows, scale, offset = self._letterboxed(image)
         rows = rows[rows[:, 4] >= self._score]
-        return self._unboxed(rows[:, 5], rows[:, :4], rows[:, 4], image, scale, (left, top))
+        return self._unboxed(rows[:, 5], rows[:, :4], rows[:, 4], image, scale, offset)
 
     @staticmethod
     def _unboxed(label: NDArray[Any], corners: NDArray[Any], score: NDArray[Any],
                  image: NDArray[np.uint8], scale: float,
-                 offset: tuple[float, float]) -> Detections:
+                 offset: tuple[int, int]) -> Detections:
         """Return detections in pixels of the image that was letterboxed."""
-        corners = (corners.reshape(-1, 4) - np.tile(np.float32(offset), 2)) / scale
+        corners = (corners - np.tile(offset, 2)) / scale
         return Detections.of(label, corners, score, image.shape[1], image.shape[0])
+
+
+def _are_sides(sides: Any) -> bool:
+    return isinstance(sides, list) and len(sides) == 2 and all(
+        isinstance(side, int) and side > 0 for side in sides)
