@@ -1,42 +1,73 @@
-"""Visual words: a binary k-means tree with tf-idf weights (paper, Fig. 2a; DBoW)."""
+"""Visual words: a tree of binary centres with tf-idf weights (paper, Fig. 2a; DBoW)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.cluster import KMeans
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES
 
 ROUNDS = 12
+_LANES = DESCRIPTOR_BYTES // 8
+# Descriptors that are compared, or unpacked, at a time: bounds the memory of training.
+_CHUNK = 1 << 15
+_PAIRS = np.uint64(0x5555555555555555)
+_NIBBLES = np.uint64(0x3333333333333333)
+_BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
+_SUM = np.uint64(0x0101010101010101)
 
 
-def signs(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return descriptors, uint8 (k, 32), as +-1 float32 (k, 256): hamming = (256 - dot) / 2."""
-    bits = np.unpackbits(descriptor, axis=1).astype(np.float32)
-    return 2 * bits - 1
+def _bit_count(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return the number of ones of each value, for numpy before 2.0."""
+    value = value - ((value >> np.uint64(1)) & _PAIRS)
+    value = (value & _NIBBLES) + ((value >> np.uint64(2)) & _NIBBLES)
+    value = (value + (value >> np.uint64(4))) & _BYTES
+    return (value * _SUM) >> np.uint64(56)
 
 
-@dataclass(frozen=True)
+_count_ones = getattr(np, 'bitwise_count', _bit_count)
+
+
+def lanes(descriptor: NDArray[np.uint8]) -> NDArray[np.uint64]:
+    """Return descriptors, uint8 (.., 32), as uint64 (.., 4) to be compared by ``hamming``."""
+    packed: NDArray[np.uint64] = np.ascontiguousarray(descriptor, np.uint8).view(np.uint64)
+    return packed
+
+
+def hamming(a: NDArray[np.uint64], b: NDArray[np.uint64]) -> NDArray[np.uint16]:
+    """Return how many bits differ, uint16 (..), between lanes (.., 4) that are broadcast."""
+    # On integers, not by a float matrix product, which is no faster here, and several times
+    # slower while BLAS threads wait for the cores that the object network holds.
+    distance: NDArray[np.uint16] = _count_ones(a ^ b).sum(axis=-1, dtype=np.uint16)
+    return distance
+
+
+@dataclass(frozen=True, eq=False)
 class Vocabulary:
     """
     A tree of binary centres; its leaves are the words.
 
     Attributes
     ----------
-    centre : uint8, (depth levels stacked: b + b^2 + .. + b^d, 32)
-        Children of node i of a level are i * b .. i * b + b - 1 of the next. Children that no
-        training descriptor fell to repeat their first sibling, and are never chosen.
+    centre : uint8, (b + b^2 + .. + b^d, 32)
+        Levels one after the other. Children of node i of a level are i * b .. i * b + b - 1 of
+        the next.
     idf : float32, (b^d,)
         ln(frames / frames with the word); 0 for a word that no training frame has.
     branching, depth : int
         b and d.
+
+    Raises
+    ------
+    ModelError
+        Shapes, types or values do not make a tree.
 
     """
 
@@ -46,23 +77,33 @@ class Vocabulary:
     depth: int
 
     def __post_init__(self) -> None:
-        """Check shapes and unpack the centres."""
+        """Check shapes, types and values."""
         b, d = self.branching, self.depth
-        nodes = sum(b ** level for level in range(1, d + 1))
-        if b < 2 or d < 1 or self.centre.shape != (nodes, DESCRIPTOR_BYTES) or (
-                self.centre.dtype != np.uint8 or self.idf.shape != (b ** d,)
-                or not np.isfinite(self.idf).all()):
+        if b < 2 or d < 1 or self.centre.dtype != np.uint8 or self.centre.shape != (
+                sum(b ** level for level in range(1, d + 1)), DESCRIPTOR_BYTES):
             raise ModelError(f'vocabulary of branching {b} and depth {d}: found centres '
-                             f'{self.centre.shape} and idf {self.idf.shape}')
+                             f'{self.centre.dtype}{self.centre.shape}')
+        if self.idf.dtype != np.float32 or self.idf.shape != (b ** d,) or not (
+                np.isfinite(self.idf).all() and (self.idf >= 0).all()):
+            raise ModelError(f'vocabulary of {b ** d} words: found idf {self.idf.dtype}'
+                             f'{self.idf.shape}; expected finite float32 >= 0 for each')
+
+    @cached_property
+    def _levels(self) -> list[NDArray[np.uint64]]:
+        """The centres of each level, by parent, (parents, b, 4)."""
+        packed = lanes(self.centre)
         levels, start = [], 0
-        for level in range(1, d + 1):
-            levels.append(signs(self.centre[start:start + b ** level]).reshape(-1, b, 256))
-            start += b ** level
-        object.__setattr__(self, '_levels', levels)
+        for level in range(1, self.depth + 1):
+            end = start + self.branching ** level
+            levels.append(packed[start:end].reshape(-1, self.branching, _LANES))
+            start = end
+        return levels
 
     def words(self, descriptor: NDArray[np.uint8]) -> NDArray[np.uint32]:
         """
         Return the word of each ORB descriptor by descending the tree.
+
+        At every level the nearest child by Hamming distance is taken, the first of equals.
 
         Parameters
         ----------
@@ -73,23 +114,17 @@ class Vocabulary:
         uint32, (k,)
 
         """
-        node = np.zeros(len(descriptor), np.int64)
-        bits = signs(descriptor)
-        levels: list[NDArray[np.float32]] = self._levels  # type: ignore[attr-defined]
-        for centres in levels:
-            # Grouped by node: one small matrix product for each node that is reached.
-            order = np.argsort(node, kind='stable')
-            groups = np.flatnonzero(np.diff(node[order], prepend=-1))
-            child = np.zeros(len(node), np.int64)
-            for members in np.split(order, groups[1:]):
-                if len(members):
-                    child[members] = (bits[members] @ centres[node[members[0]]].T).argmax(axis=1)
-            node = node * self.branching + child
+        node: NDArray[np.int64] = np.zeros(len(descriptor), np.int64)
+        bits = lanes(descriptor)[:, None]
+        for centre in self._levels:
+            node = node * self.branching + hamming(bits, centre[node]).argmin(axis=1)
         return node.astype(np.uint32)
 
     def vector(self, words: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """
         Return the vBoW vector of a frame: words, ascending, and L1-normalised tf-idf weights.
+
+        Words without weight (idf 0) are left out.
 
         Parameters
         ----------
@@ -105,18 +140,18 @@ class Vocabulary:
         return word.astype(np.uint32), (weight / (total or 1)).astype(np.float32)
 
     def save(self, path: Path) -> None:
-        """Write as npz."""
+        """Write as npz; same vocabulary, same bytes."""
         np.savez_compressed(path, centre=self.centre, idf=self.idf,
                             shape=np.array([self.branching, self.depth]))
 
     @classmethod
     def load(cls, path: Path) -> Vocabulary:
-        """Read a vocabulary; raises ModelError."""
+        """Read a vocabulary that ``save`` wrote; raises ModelError."""
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 branching, depth = (int(value) for value in arrays['shape'])
                 return cls(arrays['centre'], arrays['idf'], branching, depth)
-        except (OSError, ValueError, KeyError, BadZipFile) as error:
+        except (OSError, EOFError, TypeError, ValueError, KeyError, BadZipFile) as error:
             raise ModelError(f'{path} is no vocabulary: {error!r}; train one with '
                              '"adversarial-lcd train"') from error
 
@@ -126,8 +161,9 @@ def train_vocabulary(frames: Sequence[NDArray[np.uint8]], branching: int = 16, d
     """
     Cluster descriptors into a tree, level by level, and weigh the words by their rarity.
 
-    k-means on +-1 vectors, whose centres are rounded to the nearest binary descriptor (the
-    majority of each bit).
+    k-majority: k-means under the Hamming distance, where a centre has each bit as most of its
+    members have it. Everything is counted in integers: neither the machine nor its number of
+    threads changes the outcome.
 
     Parameters
     ----------
@@ -144,40 +180,93 @@ def train_vocabulary(frames: Sequence[NDArray[np.uint8]], branching: int = 16, d
         There are fewer descriptors than words.
 
     """
-    descriptor = np.concatenate(list(frames)) if frames else np.zeros((0, 32), np.uint8)
+    descriptor = np.concatenate(list(frames)) if frames else np.zeros((0, DESCRIPTOR_BYTES),
+                                                                      np.uint8)
     if len(descriptor) < branching ** depth:
         raise ModelError(f'{len(descriptor)} descriptors for {branching ** depth} words: '
                          'train on more frames, or ask for fewer words')
     rng = np.random.default_rng(seed)
-    node = np.zeros(len(descriptor), np.int64)
+    node: NDArray[np.int64] = np.zeros(len(descriptor), np.int64)
     levels = []
     for level in range(depth):
-        centres = np.zeros((branching ** level, branching, DESCRIPTOR_BYTES), np.uint8)
-        child = np.zeros(len(node), np.int64)
+        centre = np.zeros((branching ** level, branching, DESCRIPTOR_BYTES), np.uint8)
+        child = np.zeros_like(node)
         order = np.argsort(node, kind='stable')
         for members in np.split(order, np.flatnonzero(np.diff(node[order])) + 1):
             parent = node[members[0]]
-            centres[parent] = _split(descriptor[members], branching, rng)
-            child[members] = (signs(descriptor[members])
-                              @ signs(centres[parent]).T).argmax(axis=1)
-        levels.append(centres.reshape(-1, DESCRIPTOR_BYTES))
+            centre[parent], child[members] = _cluster(descriptor[members], branching, rng)
+        levels.append(centre.reshape(-1, DESCRIPTOR_BYTES))
         node = node * branching + child
-    unweighted = Vocabulary(np.concatenate(levels), np.ones(branching ** depth, np.float32),
-                            branching, depth)
-    having = np.zeros(branching ** depth)
-    for frame in frames:
-        having[np.unique(unweighted.words(frame))] += 1
+    size = [len(frame) for frame in frames]
+    having = np.zeros(branching ** depth, np.int64)
+    for words in np.split(node, np.cumsum(size)[:-1]):
+        having[np.unique(words)] += 1
     idf = np.where(having > 0, np.log(len(frames) / np.maximum(having, 1)), 0)
-    return Vocabulary(unweighted.centre, idf.astype(np.float32), branching, depth)
+    return Vocabulary(np.concatenate(levels), idf.astype(np.float32), branching, depth)
 
 
-def _split(descriptor: NDArray[np.uint8], branching: int,
+def _cluster(descriptor: NDArray[np.uint8], count: int, rng: np.random.Generator
+             ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    """
+    Return centres, uint8 (count, 32), and which of them is nearest to each descriptor, (k,).
+
+    Where descriptors are too few for so many centres, the last ones repeat the first.
+    """
+    centre = _seeds(descriptor, count, rng)
+    member, distance = _nearest(descriptor, centre)
+    for _ in range(ROUNDS):
+        before = member
+        centre = _majorities(descriptor, member, centre)
+        for empty in np.setdiff1d(np.arange(count), member):
+            farthest = distance.argmax()
+            if not distance[farthest]:
+                centre[empty] = centre[0]
+                continue
+            centre[empty], distance[farthest] = descriptor[farthest], 0
+        member, distance = _nearest(descriptor, centre)
+        if np.array_equal(member, before):
+            break
+    return centre, member
+
+
+def _seeds(descriptor: NDArray[np.uint8], count: int,
            rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return b binary centres of descriptors, uint8 (b, 32)."""
-    distinct = np.unique(descriptor, axis=0)
-    if len(distinct) <= branching:
-        return np.concatenate([distinct, np.repeat(distinct[:1], branching - len(distinct), 0)])
-    model = KMeans(branching, init='k-means++', n_init=1, max_iter=ROUNDS, algorithm='lloyd',
-                   random_state=int(rng.integers(2**31)))
-    model.fit(signs(descriptor))
-    return np.packbits(model.cluster_centers_ > 0, axis=1)
+    """Return first centres by k-means++: far ones are likelier (distances of bits are squares)."""
+    chosen = [int(rng.integers(len(descriptor)))]
+    _, distance = _nearest(descriptor, descriptor[chosen])
+    while len(chosen) < count:
+        total = np.cumsum(distance, dtype=np.int64)
+        if not total[-1]:
+            chosen.append(chosen[0])
+            continue
+        chosen.append(int(np.searchsorted(total, rng.integers(total[-1]), 'right')))
+        distance = np.minimum(distance, _nearest(descriptor, descriptor[chosen[-1:]])[1])
+    return descriptor[chosen]
+
+
+def _nearest(descriptor: NDArray[np.uint8], centre: NDArray[np.uint8]
+             ) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
+    """Return index and Hamming distance of the nearest centre, the first of equals, (k,)."""
+    bits, to = lanes(descriptor)[:, None], lanes(centre)
+    member = np.zeros(len(descriptor), np.int64)
+    distance = np.zeros(len(descriptor), np.uint16)
+    for start in range(0, len(descriptor), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        each = hamming(bits[part], to)
+        member[part] = each.argmin(axis=1)
+        distance[part] = each.min(axis=1)
+    return member, distance
+
+
+def _majorities(descriptor: NDArray[np.uint8], member: NDArray[np.int64],
+                centre: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the centres of the members; one without members stays."""
+    count = np.bincount(member, minlength=len(centre))
+    ones = np.zeros((len(centre), 8 * DESCRIPTOR_BYTES), np.int64)
+    for index in np.flatnonzero(count):
+        chosen = np.flatnonzero(member == index)
+        for start in range(0, len(chosen), _CHUNK):
+            bits = np.unpackbits(descriptor[chosen[start:start + _CHUNK]], axis=1)
+            ones[index] += bits.sum(axis=0, dtype=np.int64)
+    moved = np.packbits(2 * ones > count[:, None], axis=1)
+    return np.where(count[:, None] > 0, moved, centre)
