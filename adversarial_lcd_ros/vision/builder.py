@@ -119,11 +119,14 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
     """
     first = len(objects)
     centre = objects.box[:, :2] + objects.box[:, 2:] / 2
-    edge = np.concatenate([
+    pairs = np.concatenate([
         np.stack(np.triu_indices(first, 1), axis=1),
         _spokes(features.position, objects.box, centre, first),
-        _neighbour_edges(features.position, neighbours) + first]).astype(np.uint32)
-    edge = np.unique(edge, axis=0).reshape(-1, 2)
+        _neighbour_edges(features.position, neighbours) + first])
+    # As one number each, which sorts several times faster than rows do.
+    count = first + len(features)
+    key = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    edge = np.stack(np.divmod(key, max(count, 1)), axis=1).astype(np.uint32)
     position = np.concatenate([centre, features.position]).astype(np.float32)
     diagonal = np.float32(np.hypot(width, height))
     offset = position[edge[:, 0]] - position[edge[:, 1]]

@@ -40,6 +40,12 @@ class Features:
         """Return the number of features."""
         return len(self.score)
 
+    @classmethod
+    def none(cls) -> Features:
+        """Return no features."""
+        return cls(np.zeros((0, 2), np.float32), np.zeros(0, np.float32),
+                   np.zeros(0, np.float32), np.zeros((0, DESCRIPTOR_BYTES), np.uint8))
+
     def __getitem__(self, chosen: NDArray[np.int64]) -> Features:
         """Return the features with the given indices."""
         return Features(self.position[chosen], self.size[chosen], self.score[chosen],
@@ -64,10 +70,12 @@ class FeatureExtractor:
 
     def extract(self, grey: NDArray[np.uint8]) -> Features:
         """Return the features of a grey image, uint8 (h, w), strongest first."""
+        # ORB keeps off the border, and OpenCV fails on images of a few pixels.
+        if min(grey.shape) <= 2 * self._orb.getEdgeThreshold():
+            return Features.none()
         keypoints, descriptor = self._orb.detectAndCompute(grey, None)
         if not keypoints:
-            return Features(np.zeros((0, 2), np.float32), np.zeros(0, np.float32),
-                            np.zeros(0, np.float32), np.zeros((0, DESCRIPTOR_BYTES), np.uint8))
+            return Features.none()
         features = Features(np.asarray(cv2.KeyPoint.convert(keypoints), np.float32),
                             np.array([keypoint.size for keypoint in keypoints], np.float32),
                             np.array([keypoint.response for keypoint in keypoints], np.float32),
