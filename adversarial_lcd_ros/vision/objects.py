@@ -142,8 +142,12 @@ class ObjectDetector:
             self._session = onnxruntime.InferenceSession(
                 str(model), options, providers=['CPUExecutionProvider'])
         except Exception as error:  # onnxruntime's own classes are private
-            raise ModelError(f'{model} cannot be loaded as ONNX: {error}') from error
+            raise ModelError(f'{model} cannot be loaded as ONNX: {error}; '
+                             '"adversarial-lcd fetch-model" provides the default model'
+                             ) from error
         self._run = self._recognise()
+        # A model that cannot run says so now, and the first frame finds it warm.
+        self.detect(np.zeros((*self._size[::-1], 3), np.uint8))
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """
@@ -157,7 +161,7 @@ class ObjectDetector:
         Raises
         ------
         ModelError
-            The network fails.
+            The network fails, or its output has another shape than its kind has.
 
         """
         return self._run(image)
@@ -204,11 +208,18 @@ class ObjectDetector:
                              'height, width): export the model with a fixed size')
         return int(sides[1]), int(sides[0])
 
-    def _infer(self, feed: dict[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+    def _infer(self, feed: dict[str, NDArray[np.float32]],
+               shape: tuple[int | None, ...]) -> NDArray[np.float32]:
+        """Return the first output, whose shape is checked; None stands for any number."""
         try:
             found: NDArray[np.float32] = self._session.run([self._output], feed)[0]
         except Exception as error:  # onnxruntime's own classes are private
             raise ModelError(f'{self._model} fails on an image: {error}') from error
+        if found.ndim != len(shape) or not all(
+                expected in (None, side)
+                for side, expected in zip(found.shape, shape, strict=True)):
+            raise ModelError(f'{self._model}: output {self._output} of shape {found.shape}; '
+                             f'expected {shape}')
         return found
 
     def _paddle(self, image: NDArray[np.uint8]) -> Detections:
@@ -219,12 +230,12 @@ class ObjectDetector:
         tensor = np.stack([cv2.LUT(plane, self._normalised[:, channel])
                            for channel, plane in enumerate(reversed(planes))])
         found = self._infer({'image': tensor[None], 'scale_factor': np.array(
-            [[rows / height, columns / width]], np.float32)})
+            [[rows / height, columns / width]], np.float32)}, (None, 6))
         # A row of class -1 stands for "nothing found".
         found = found[(found[:, 1] >= self._score) & (found[:, 0] >= 0)]
         return Detections.of(found[:, 0], found[:, 2:6], found[:, 1], width, height)
 
-    def _letterboxed(self, image: NDArray[np.uint8]
+    def _letterboxed(self, image: NDArray[np.uint8], shape: tuple[int | None, ...]
                      ) -> tuple[NDArray[np.float32], float, tuple[int, int]]:
         """Return the output for an image scaled with its aspect kept, the scale and offset."""
         height, width = image.shape[:2]
@@ -236,10 +247,10 @@ class ObjectDetector:
         canvas = np.full((rows, columns, 3), LETTERBOX_GREY, np.uint8)
         canvas[top:top + resized.shape[0], left:left + resized.shape[1]] = resized
         tensor = cv2.dnn.blobFromImage(canvas, 1 / 255, swapRB=True)
-        return self._infer({self._input: tensor})[0], scale, (left, top)
+        return self._infer({self._input: tensor}, shape)[0], scale, (left, top)
 
     def _yolo_raw(self, image: NDArray[np.uint8]) -> Detections:
-        head, scale, offset = self._letterboxed(image)
+        head, scale, offset = self._letterboxed(image, (1, None, None))
         label, score = head[4:].argmax(axis=0), head[4:].max(axis=0)
         sure = np.flatnonzero(score >= self._score)
         label, score = label[sure], score[sure]
@@ -252,7 +263,7 @@ class ObjectDetector:
         return self._unboxed(label[kept], corners[kept], score[kept], image, scale, offset)
 
     def _yolo_end_to_end(self, image: NDArray[np.uint8]) -> Detections:
-        rows, scale, offset = self._letterboxed(image)
+        rows, scale, offset = self._letterboxed(image, (1, None, 6))
         rows = rows[rows[:, 4] >= self._score]
         return self._unboxed(rows[:, 5], rows[:, :4], rows[:, 4], image, scale, offset)
 
