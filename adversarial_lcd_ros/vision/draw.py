@@ -32,6 +32,7 @@ _SHIFT = 4
 _DASH, _GAP = 7.0, 5.0
 _PANEL_WIDTH, _PANEL_HEIGHT, _PANEL_GAP = 476, 360, 6
 _TEXT_HEIGHT = 30
+_TAG_HEIGHT = 16
 
 
 def draw_graph(image: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayLike | None = None, *,
@@ -188,19 +189,25 @@ def _dashes(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[
 
 def _draw_objects(canvas: NDArray[np.uint8], graph: MultiTierGraph, classes: Sequence[str],
                   scale: float) -> None:
+    """Draw boxes and, over them, the class names, none on another."""
     count = graph.object_count
     half = graph.size[:count] / 2
     corners = np.rint(scale * np.hstack([graph.position[:count] - half,
-                                         graph.position[:count] + half])).astype(int)
-    for label, (left, top, right, bottom) in zip(graph.label.tolist(), corners.tolist(),
-                                                 strict=False):
+                                         graph.position[:count] + half])).astype(int).tolist()
+    for left, top, right, bottom in corners:
         cv2.rectangle(canvas, (left, top), (right, bottom), _OBJECT, 1, cv2.LINE_AA)
+    taken: list[tuple[int, int, int]] = []
+    for label, (left, top, _, _) in zip(graph.label[:count].tolist(), corners, strict=True):
         name = classes[label] if label < len(classes) else f'class {label}'
-        (width, height), _ = cv2.getTextSize(name, _FONT, 0.4, 1)
+        width = cv2.getTextSize(name, _FONT, 0.4, 1)[0][0] + 6
         # Inside the frame, also where the box begins above it.
-        x = max(0, min(left, canvas.shape[1] - width - 6))
-        y = max(height + 6, top)
-        cv2.rectangle(canvas, (x, y - height - 6), (x + width + 6, y), _OBJECT, -1)
+        x = max(0, min(left, canvas.shape[1] - width))
+        y = max(_TAG_HEIGHT, top)
+        while any(abs(y - other) < _TAG_HEIGHT and x < end and start < x + width
+                  for start, end, other in taken):
+            y += 1
+        taken.append((x, x + width, y))
+        cv2.rectangle(canvas, (x, y - _TAG_HEIGHT + 1), (x + width - 1, y - 1), _OBJECT, -1)
         cv2.putText(canvas, name, (x + 3, y - 4), _FONT, 0.4, _PAPER, 1, cv2.LINE_AA)
 
 

@@ -1,0 +1,93 @@
+"""Pictures of graphs: size, colours of what was flipped, what is refused."""
+
+from graph_factory import make_graph
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros.errors import GraphError
+from adversarial_lcd_ros.vision.draw import draw_attack, draw_graph
+
+FRAME = np.full((480, 640, 3), 128, np.uint8)
+PLACES = np.array([(320, 100), (100, 300), (540, 300), (300, 440), (40, 40), (600, 60)],
+                  np.float32)
+
+
+def scene(**fields):
+    return make_graph(nodes=6, edges=((0, 1), (2, 3)), objects=1, position=PLACES, **fields)
+
+
+def reds(picture, place):
+    """Return how many pixels near a place are red."""
+    x, y = np.rint(place).astype(int)
+    patch = picture[y - 5:y + 6, x - 5:x + 6].astype(int)
+    return int(((patch[..., 2] > 180) & (patch[..., :2].max(axis=2) < 110)).sum())
+
+
+def red_share(picture, a, b):
+    """Return the share of points on a line that are red."""
+    steps = np.linspace(0.1, 0.9, 200)[:, None]
+    points = np.rint(PLACES[a] + steps * (PLACES[b] - PLACES[a])).astype(int)
+    pixel = picture[points[:, 1], points[:, 0]].astype(int)
+    return ((pixel[:, 2] > 180) & (pixel[:, :2].max(axis=1) < 110)).mean()
+
+
+def test_added_edges_are_solid_red_and_deleted_ones_dashed():
+    flips = [(2, 3), (1, 2)]
+    picture = draw_graph(FRAME, scene().flip(flips), flips)
+    assert red_share(picture, 1, 2) > 0.95
+    assert 0.3 < red_share(picture, 2, 3) < 0.8
+    assert red_share(picture, 0, 1) < 0.05
+
+
+def test_without_flips_nothing_is_red_and_the_frame_is_left_alone():
+    frame = FRAME.copy()
+    frame.flags.writeable = False
+    picture = draw_graph(frame, scene())
+    assert picture.shape == frame.shape
+    assert all(reds(picture, place) == 0 for place in PLACES)
+    assert not np.array_equal(picture, frame)
+
+
+@pytest.mark.parametrize('scale', [0.5, 1.0, 1.5])
+def test_a_picture_has_the_size_that_is_asked_for(scale):
+    grey = FRAME[..., 0].copy()
+    assert draw_graph(grey, scene(), scale=scale).shape == (480 * scale, 640 * scale, 3)
+
+
+def test_graphs_without_nodes_and_unknown_classes_are_drawn():
+    assert draw_graph(FRAME, make_graph(0, (), 0)).shape == FRAME.shape
+    assert draw_graph(FRAME, scene(label=np.full(6, 4_000_000_000, np.uint32))).any()
+
+
+def test_tags_of_boxes_at_one_place_do_not_hide_each_other():
+    from adversarial_lcd_ros.vision.draw import _OBJECT
+
+    def tag_area(objects):
+        same = np.repeat(PLACES[:1], 6, axis=0)
+        picture = draw_graph(FRAME, make_graph(
+            6, (), objects, position=same, size=np.full((6, 2), 60, np.float32),
+            label=np.full(6, 56, np.uint32)), legend=False)
+        return (picture == _OBJECT).all(axis=2).sum()
+    assert tag_area(3) > 2.5 * tag_area(1)
+
+
+def test_an_attack_shows_query_match_and_flips():
+    clean, match = scene(), scene(seed=4)
+    perturbed = clean.flip([(1, 2)])
+    plain = draw_attack(FRAME, clean, FRAME, match, perturbed)
+    told = draw_attack(FRAME, clean, FRAME, None, perturbed, 'Frame 7: suppressed ' * 20)
+    assert plain.shape[1] == told.shape[1] >= 3 * 480
+    assert told.shape[0] == plain.shape[0] + 30
+    third = plain.shape[1] - 480
+    red = (plain[..., 2] > 180) & (plain[..., :2].max(axis=2) < 110)
+    assert red[:, third:].any()
+    assert not red[:, :third].any()
+
+
+def test_what_does_not_belong_together_is_refused():
+    with pytest.raises(GraphError, match='the graph is of one of 640 x 480'):
+        draw_graph(FRAME[:100], scene())
+    with pytest.raises(GraphError):
+        draw_graph(FRAME, scene(), [(0, 6)])
+    with pytest.raises(GraphError, match='nodes'):
+        draw_attack(FRAME, scene(), FRAME, None, scene(seed=4))
