@@ -27,7 +27,7 @@ from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.paths import cache_folder
 
 MODEL_NAME = 'picodet_s_coco.onnx'
-MODEL_SHA256 = 'f879ca8e2366f798d6b7ff2132d0b7d35018cdcc9e001a051d4363029aed6963'
+MODEL_SHA256 = '4c762b2b52fda654ed5372f30bbb501891f647e1a782f8ccee88976e299f8a41'
 SOURCE = 'paddlelabel-ml==1.0.0'
 SOURCE_FOLDER = 'paddlelabel_ml/model/PicoDet/ckpt'
 SOURCE_SHA256 = {
@@ -36,7 +36,7 @@ SOURCE_SHA256 = {
 }
 CONVERTER = 'paddle2onnx==1.2.4'
 CONVERTER_PYTHONS = ('3.12', '3.11', '3.10')
-OPSET = 13
+OPSET = 14
 INPUT_SIZE = 416
 _TIMEOUT_S = 900.0
 
