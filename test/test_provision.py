@@ -18,7 +18,7 @@ EXPORT = f"""
 import os
 def export(model, weights, out, opset_version):
     assert 'LD_LIBRARY_PATH' not in os.environ, 'LD_LIBRARY_PATH'
-    assert open(model, 'rb').read() == {NETWORK!r} and opset_version == 13
+    assert open(model, 'rb').read() == {NETWORK!r} and opset_version == {provision.OPSET}
     open(out, 'wb').write({CONVERTED!r})
 """
 
