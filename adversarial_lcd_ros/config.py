@@ -113,7 +113,7 @@ class BuilderConfig(Config):
         'the width or height.', low=0.0, high=0.5)
     max_objects: int = setting(20, 'Most object nodes in a graph.', low=0, high=200)
     threads: int = setting(
-        2, 'Threads of the network; 0: as many as cores.', low=0, high=256)
+        1, 'Threads of the network for one frame; 0: as many as cores.', low=0, high=256)
 
 
 @dataclass(frozen=True)
@@ -265,6 +265,9 @@ class GraphBuilderNodeConfig(Config):
     queue_depth: int = setting(
         10, 'Camera frames that may wait; older ones give way. 1: always the newest.',
         low=1, high=1000)
+    frames_at_once: int = setting(
+        2, 'Frames whose objects are looked for side by side; graphs leave in the order of '
+        'their frames.', low=1, high=64)
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,13 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.paths import model_path
 from adversarial_lcd_ros.vision import vocabulary as module
-from adversarial_lcd_ros.vision.vocabulary import Vocabulary, hamming, lanes, train_vocabulary
-
-DESCRIPTORS = hnp.arrays(np.uint8, st.tuples(st.integers(1, 12), st.just(32)))
+from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
 
 
 def random_descriptors(count, seed=0):
@@ -38,17 +35,6 @@ def frames():
 @pytest.fixture(scope='module')
 def shipped():
     return Vocabulary.load(model_path('vocabulary.npz'))
-
-
-@given(DESCRIPTORS, DESCRIPTORS)
-def test_hamming_counts_the_bits_that_differ(a, b):
-    expected = np.unpackbits(a[:, None] ^ b[None], axis=2).sum(axis=2)
-    np.testing.assert_array_equal(hamming(lanes(a)[:, None], lanes(b)), expected)
-
-
-@given(hnp.arrays(np.uint64, 5))
-def test_ones_are_counted_without_numpy_2(values):
-    assert module._bit_count(values).tolist() == [int(v).bit_count() for v in values]
 
 
 def test_a_word_is_the_nearest_leaf_below_the_nearest_branch():

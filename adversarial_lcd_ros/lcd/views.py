@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
+from adversarial_lcd_ros.hamming import lanes, mutual
 
 MIN_COSINE = 0.4
 NEIGHBOUR_WEIGHT = 0.5
 LENGTH_SCALE = 0.1
+_BITS = 8 * DESCRIPTOR_BYTES
+# The largest distance whose cosine, 1 - 2 distance / bits, is above MIN_COSINE.
+_FARTHEST = math.ceil((1 - MIN_COSINE) * _BITS / 2) - 1
 
 
 def unpack_descriptors(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -66,6 +71,11 @@ class View:
         return rows
 
     @cached_property
+    def lanes(self) -> NDArray[np.uint64]:
+        """Descriptors of the features as ``hamming`` compares them, shape (4, features)."""
+        return lanes(self.graph.descriptor[self.objects:])
+
+    @cached_property
     def neighbour_mean(self) -> NDArray[np.float32]:
         """Mean of x0 over the neighbours, weighted by exp(-length / 0.1), shape (n, 256)."""
         weight = self.graph.weighted_adjacency(LENGTH_SCALE).astype(np.float32)
@@ -103,16 +113,10 @@ class NodeMatch:
 
 def match_nodes(query: View, reference: View) -> NodeMatch:
     """Return the mutual nearest neighbours between the features of two graphs."""
-    if not query.features or not reference.features:
-        none = np.zeros(0, np.int64)
-        return NodeMatch(none, none, np.zeros(0, np.float32))
-    cosine = query.x0[query.objects:] @ reference.x0[reference.objects:].T
-    forward, backward = cosine.argmax(axis=1), cosine.argmax(axis=0)
-    rows = np.arange(query.features)
-    best = cosine[rows, forward]
-    kept = np.flatnonzero((backward[forward] == rows) & (best > MIN_COSINE))
-    return NodeMatch(kept + query.objects, forward[kept] + reference.objects,
-                     np.sqrt(best[kept] - np.float32(MIN_COSINE)))
+    first, second, distance = mutual(query.lanes, reference.lanes, _FARTHEST)
+    cosine = 1 - distance / np.float32(_BITS / 2)
+    return NodeMatch(first + query.objects, second + reference.objects,
+                     np.sqrt(cosine - np.float32(MIN_COSINE)))
 
 
 class Comparison:

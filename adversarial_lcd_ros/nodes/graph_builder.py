@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 import sys
 import time
@@ -24,11 +25,19 @@ from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.payload import wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.settings import NODE_CONFIGS
-from adversarial_lcd_ros.vision.builder import GraphBuilder
+from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.draw import draw_graph
 
 IMAGE, COMPRESSED = 'image', 'image/compressed'
 _REMEMBERED_STAMPS = 64
+
+
+@dataclass(frozen=True)
+class _Frame:
+    building: Building
+    header: Header
+    image: NDArray[np.uint8]
+    arrival_s: float
 
 
 class GraphBuilderNode(PipelineNode):
@@ -47,7 +56,11 @@ class GraphBuilderNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         config, node_config = self.settings
-        self._builder = GraphBuilder(config)
+        self._builder = GraphBuilder(config, node_config.frames_at_once)
+        self._frames_at_once = node_config.frames_at_once
+        self._under_way: deque[_Frame] = deque()
+        # Publishes in this node's own thread what a thread of the network has finished.
+        self._ready = self.create_guard_condition(self._publish_ready)
         self._sequence = 0
         self._graphs = create_payload_publisher(self, 'graph')
         self._overlays = self.create_publisher(Image, 'overlay', qos_profile_sensor_data)
@@ -73,15 +86,31 @@ class GraphBuilderNode(PipelineNode):
         sequence, self._sequence = self._sequence, self._sequence + 1
         try:
             image = pixels(message)
-            graph = self._builder.build(image, stamp_ns, message.header.frame_id, sequence)
+            building = self._builder.begin(image, stamp_ns, message.header.frame_id, sequence)
+        except AdversarialLcdError as error:
+            self.diagnostics.refuse('frame', error)
+            return
+        self._under_way.append(_Frame(building, message.header, image, arrival_s))
+        building.when_ready(self._ready.trigger)
+        while len(self._under_way) > self._frames_at_once:
+            self._publish(self._under_way.popleft())
+
+    def _publish_ready(self) -> None:
+        while self._under_way and self._under_way[0].building.ready():
+            self._publish(self._under_way.popleft())
+
+    def _publish(self, frame: _Frame) -> None:
+        """Publish a graph; waits for it if need be."""
+        try:
+            graph = frame.building.graph()
         except AdversarialLcdError as error:
             self.diagnostics.refuse('frame', error)
             return
         self._graphs.publish(wrap(encode_graph(graph)))
         self.diagnostics.count('published graphs')
-        self.diagnostics.time(time.perf_counter() - arrival_s)
+        self.diagnostics.time(time.perf_counter() - frame.arrival_s)
         if self._overlays.get_subscription_count():
-            self._publish_overlay(message.header, image, graph)
+            self._publish_overlay(frame.header, frame.image, graph)
 
     def _is_repeat(self, topic: str, stamp_ns: int) -> bool:
         """Tell whether the frame came already on the other topic: drivers offer both."""
@@ -108,7 +137,9 @@ class GraphBuilderNode(PipelineNode):
                                      step=3 * width, data=array('B', drawn.tobytes())))
 
     def close(self) -> None:
-        """Stop the thread of the network."""
+        """Publish what is under way, and stop the threads of the network."""
+        while self._under_way:
+            self._publish(self._under_way.popleft())
         self._builder.close()
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -23,15 +24,52 @@ from adversarial_lcd_ros.vision.objects import (
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 
+class Building:
+    """
+    A graph under way: the network looks for its objects in another thread.
+
+    Parameters
+    ----------
+    objects : Future of Detections
+    finish : callable
+        Detections -> MultiTierGraph.
+
+    """
+
+    def __init__(self, objects: Future[Detections],
+                 finish: Callable[[Detections], MultiTierGraph]) -> None:
+        self._objects = objects
+        self._finish = finish
+
+    def ready(self) -> bool:
+        """Tell whether the objects are there, so that ``graph`` need not wait."""
+        return self._objects.done()
+
+    def when_ready(self, call: Callable[[], object]) -> None:
+        """Call, from some thread, once the objects are there."""
+        self._objects.add_done_callback(lambda _: call())
+
+    def graph(self) -> MultiTierGraph:
+        """Return the graph as soon as it is there; raises what the network raised."""
+        return self._finish(self._objects.result())
+
+
 class GraphBuilder:
     """
     Builds the graph of a view: objects are anchors, features hang on them and on each other.
 
-    The network runs beside the feature extraction, in a thread of its own. Same image, same
+    The network runs beside the feature extraction, in threads of its own. Same image, same
     settings, same bytes. Close it, or use it as a context manager.
+
+    Parameters
+    ----------
+    config : BuilderConfig
+    frames_at_once : int
+        Frames whose objects are looked for side by side.
+
     """
 
-    def __init__(self, config: BuilderConfig | None = None) -> None:
+    def __init__(self, config: BuilderConfig | None = None, frames_at_once: int = 1) -> None:
         self.config = config or BuilderConfig()
         path = self.config.vocabulary
         self._vocabulary = Vocabulary.load(Path(path) if path else model_path('vocabulary.npz'))
@@ -41,7 +79,7 @@ class GraphBuilder:
         if self.config.detector == 'onnx':
             model = Path(self.config.model) if self.config.model else default_model_path()
             self._objects = ObjectDetector(model, self.config.object_score, self.config.threads)
-        self._thread = ThreadPoolExecutor(1, 'objects')
+        self._threads = ThreadPoolExecutor(frames_at_once, 'objects')
 
     def build(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
               sequence: int = 0) -> MultiTierGraph:
@@ -62,16 +100,21 @@ class GraphBuilder:
             The image is empty or of another type.
 
         """
+        return self.begin(image, stamp_ns, frame_id, sequence).graph()
+
+    def begin(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
+              sequence: int = 0) -> Building:
+        """Begin to build the graph of an image; see ``build``. Returns with its features."""
         grey = to_grey(image)
-        coming = self._thread.submit(self._detect, image)
+        coming = self._threads.submit(self._detect, image)
         height, width = grey.shape
         features = self._features.extract(grey)
         words = self._vocabulary.words(features.descriptor)
         kept = spread(features, self.config.features, width, height)
-        return assemble(features[kept], words[kept], coming.result(),
-                        self._vocabulary.vector(words), self.config.feature_neighbours,
-                        width=width, height=height, stamp_ns=stamp_ns, frame_id=frame_id,
-                        sequence=sequence)
+        return Building(coming, lambda objects: assemble(
+            features[kept], words[kept], objects, self._vocabulary.vector(words),
+            self.config.feature_neighbours, width=width, height=height, stamp_ns=stamp_ns,
+            frame_id=frame_id, sequence=sequence))
 
     def _detect(self, image: NDArray[np.uint8]) -> Detections:
         if self._objects is None:
@@ -82,8 +125,8 @@ class GraphBuilder:
                               self.config)
 
     def close(self) -> None:
-        """Stop the thread of the network."""
-        self._thread.shutdown()
+        """Stop the threads of the network."""
+        self._threads.shutdown()
 
     def __enter__(self) -> GraphBuilder:
         """Return the builder."""

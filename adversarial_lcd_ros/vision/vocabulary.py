@@ -13,40 +13,11 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES
+from adversarial_lcd_ros.hamming import descend, lanes, nearest
 
 ROUNDS = 12
-_LANES = DESCRIPTOR_BYTES // 8
-# Descriptors that are compared, or unpacked, at a time: bounds the memory of training.
+# Descriptors that are unpacked at a time: bounds the memory of training.
 _CHUNK = 1 << 15
-_PAIRS = np.uint64(0x5555555555555555)
-_NIBBLES = np.uint64(0x3333333333333333)
-_BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
-_SUM = np.uint64(0x0101010101010101)
-
-
-def _bit_count(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return the number of ones of each value, for numpy before 2.0."""
-    value = value - ((value >> np.uint64(1)) & _PAIRS)
-    value = (value & _NIBBLES) + ((value >> np.uint64(2)) & _NIBBLES)
-    value = (value + (value >> np.uint64(4))) & _BYTES
-    return (value * _SUM) >> np.uint64(56)
-
-
-_count_ones = getattr(np, 'bitwise_count', _bit_count)
-
-
-def lanes(descriptor: NDArray[np.uint8]) -> NDArray[np.uint64]:
-    """Return descriptors, uint8 (.., 32), as uint64 (.., 4) to be compared by ``hamming``."""
-    packed: NDArray[np.uint64] = np.ascontiguousarray(descriptor, np.uint8).view(np.uint64)
-    return packed
-
-
-def hamming(a: NDArray[np.uint64], b: NDArray[np.uint64]) -> NDArray[np.uint16]:
-    """Return how many bits differ, uint16 (..), between lanes (.., 4) that are broadcast."""
-    # On integers, not by a float matrix product, which is no faster here, and several times
-    # slower while BLAS threads wait for the cores that the object network holds.
-    distance: NDArray[np.uint16] = _count_ones(a ^ b).sum(axis=-1, dtype=np.uint16)
-    return distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +60,8 @@ class Vocabulary:
                              f'{self.idf.shape}; expected finite float32 >= 0 for each')
 
     @cached_property
-    def _levels(self) -> list[NDArray[np.uint64]]:
-        """The centres of each level, by parent, (parents, b, 4)."""
-        packed = lanes(self.centre)
-        levels, start = [], 0
-        for level in range(1, self.depth + 1):
-            end = start + self.branching ** level
-            levels.append(packed[start:end].reshape(-1, self.branching, _LANES))
-            start = end
-        return levels
+    def _lanes(self) -> NDArray[np.uint64]:
+        return lanes(self.centre)
 
     def words(self, descriptor: NDArray[np.uint8]) -> NDArray[np.uint32]:
         """
@@ -114,11 +78,9 @@ class Vocabulary:
         uint32, (k,)
 
         """
-        node: NDArray[np.int64] = np.zeros(len(descriptor), np.int64)
-        bits = lanes(descriptor)[:, None]
-        for centre in self._levels:
-            node = node * self.branching + hamming(bits, centre[node]).argmin(axis=1)
-        return node.astype(np.uint32)
+        leaf: NDArray[np.int64] = descend(lanes(descriptor), self._lanes, self.branching,
+                                          self.depth)
+        return leaf.astype(np.uint32)
 
     def vector(self, words: NDArray[np.uint32]) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """
@@ -212,8 +174,9 @@ def _cluster(descriptor: NDArray[np.uint8], count: int, rng: np.random.Generator
 
     Where descriptors are too few for so many centres, the last ones repeat the first.
     """
-    centre = _seeds(descriptor, count, rng)
-    member, distance = _nearest(descriptor, centre)
+    bits = lanes(descriptor)
+    centre = _seeds(descriptor, bits, count, rng)
+    member, distance = nearest(bits, lanes(centre))
     for _ in range(ROUNDS):
         before = member
         centre = _majorities(descriptor, member, centre)
@@ -223,39 +186,25 @@ def _cluster(descriptor: NDArray[np.uint8], count: int, rng: np.random.Generator
                 centre[empty] = centre[0]
                 continue
             centre[empty], distance[farthest] = descriptor[farthest], 0
-        member, distance = _nearest(descriptor, centre)
+        member, distance = nearest(bits, lanes(centre))
         if np.array_equal(member, before):
             break
     return centre, member
 
 
-def _seeds(descriptor: NDArray[np.uint8], count: int,
+def _seeds(descriptor: NDArray[np.uint8], bits: NDArray[np.uint64], count: int,
            rng: np.random.Generator) -> NDArray[np.uint8]:
     """Return first centres by k-means++: far ones are likelier (distances of bits are squares)."""
     chosen = [int(rng.integers(len(descriptor)))]
-    _, distance = _nearest(descriptor, descriptor[chosen])
+    _, distance = nearest(bits, lanes(descriptor[chosen]))
     while len(chosen) < count:
         total = np.cumsum(distance, dtype=np.int64)
         if not total[-1]:
             chosen.append(chosen[0])
             continue
         chosen.append(int(np.searchsorted(total, rng.integers(total[-1]), 'right')))
-        distance = np.minimum(distance, _nearest(descriptor, descriptor[chosen[-1:]])[1])
+        distance = np.minimum(distance, nearest(bits, lanes(descriptor[chosen[-1:]]))[1])
     return descriptor[chosen]
-
-
-def _nearest(descriptor: NDArray[np.uint8], centre: NDArray[np.uint8]
-             ) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
-    """Return index and Hamming distance of the nearest centre, the first of equals, (k,)."""
-    bits, to = lanes(descriptor)[:, None], lanes(centre)
-    member = np.zeros(len(descriptor), np.int64)
-    distance = np.zeros(len(descriptor), np.uint16)
-    for start in range(0, len(descriptor), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        each = hamming(bits[part], to)
-        member[part] = each.argmin(axis=1)
-        distance[part] = each.min(axis=1)
-    return member, distance
 
 
 def _majorities(descriptor: NDArray[np.uint8], member: NDArray[np.int64],
