@@ -1,0 +1,1 @@
+"""The subcommands of adversarial-lcd, a module each: ``add`` declares its options."""

@@ -1,0 +1,98 @@
+"""adversarial-lcd evaluate and demo: a bag replayed clean and attacked."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+import sys
+
+from adversarial_lcd_ros.commands.common import TABLE_WIDTH, Commands, add_command, tell
+from adversarial_lcd_ros.config import (
+    AttackConfig,
+    BuilderConfig,
+    LabelConfig,
+    LcdConfig,
+    ReplayConfig,
+)
+from adversarial_lcd_ros.settings import add_config_options, chosen_settings, config_from_options
+
+DEMO_BAG = 'bags/flat_tour'
+# Frames under way at once: the nodes work side by side, and nothing is lost.
+LIVE_WINDOW = 4
+# A class, and what its options start with where another class of the command has the name too.
+EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
+             (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands, 'evaluate',
+        'Replay a bag clean and attacked, and report what the attack cost.', _evaluate)
+    parser.add_argument('bag', type=Path, help='bag with ground truth, made by "import"')
+    _add_evaluation_options(parser, 'BAG [OPTIONS]')
+
+
+def add_demo(commands: Commands) -> None:
+    """Declare the command ``demo``."""
+    parser = add_command(
+        commands, 'demo', 'Evaluate the tour that ships with the package.', _demo)
+    _add_evaluation_options(parser, '[OPTIONS]')
+
+
+def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
+    # argparse's own usage would be forty options long before the first explanation.
+    parser.usage = f'{parser.prog} {usage}'
+    parser.add_argument('--output', type=Path, default=Path('results'), metavar='FOLDER',
+                        help='a folder named by the time is made in it, and "latest" '
+                        '(default: %(default)s)')
+    parser.add_argument('--recipe', default='quick', metavar='NAME',
+                        help='the attacks: a recipe that ships, or a .yaml file like those in '
+                        'config/recipes; settings of the attacker given here win over it '
+                        '(default: %(default)s)')
+    parser.add_argument('--rebuild', action='store_true',
+                        help='run every attack from the images (default: the first one; the '
+                        'others from its clean graphs)')
+    parser.add_argument('--keep-recordings', action='store_true',
+                        help='keep all graphs and decisions, as bags, in the results folder')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML); options of the command line win over it')
+    for config_class, prefix in EVALUATED:
+        add_config_options(parser, config_class, prefix)
+
+
+def _evaluate(options: Namespace) -> None:
+    _evaluate_bag(options.bag, options)
+
+
+def _demo(options: Namespace) -> None:
+    from adversarial_lcd_ros.paths import share_path
+
+    _evaluate_bag(share_path(DEMO_BAG), options)
+
+
+def _evaluate_bag(bag: Path, options: Namespace) -> None:
+    from rich.console import Console
+
+    from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
+    from adversarial_lcd_ros.evaluation.recipes import load_recipe
+    from adversarial_lcd_ros.evaluation.tables import decline_table, figure_table
+    from adversarial_lcd_ros.evaluation.wording import headline
+
+    attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
+    plan = Plan(config_from_options(options, BuilderConfig),
+                config_from_options(options, LcdConfig),
+                config_from_options(options, LabelConfig),
+                replace(ReplayConfig(window=LIVE_WINDOW),
+                        **chosen_settings(options, ReplayConfig)),
+                attacks, rebuild=options.rebuild)
+    folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
+                                    keep_recordings=options.keep_recordings)
+    # Where there is no terminal there is no width to keep to.
+    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
+    console.print(figure_table(summary))
+    console.print(decline_table(summary))
+    console.print(headline(summary), soft_wrap=True)
+    console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
+                  soft_wrap=True)

@@ -1,0 +1,23 @@
+"""adversarial-lcd fetch-model: the default object model."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from adversarial_lcd_ros.commands.common import Commands, add_command, tell
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands, 'fetch-model', 'Fetch the default object model, unless it is there.',
+        _fetch_model)
+    parser.add_argument('--destination', type=Path, metavar='FILE',
+                        help='ONNX file to write; if not given, where the nodes look for it')
+
+
+def _fetch_model(options: Namespace) -> None:
+    from adversarial_lcd_ros.provision import fetch_object_model
+
+    print(fetch_object_model(options.destination, progress=tell))

@@ -1,0 +1,66 @@
+"""adversarial-lcd inspect: what a bag or a payload holds."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from adversarial_lcd_ros.commands.common import Commands, add_command
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.inspection import BagSummary
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(commands, 'inspect', 'Print what a bag or a payload holds.', _inspect)
+    parser.add_argument('path', type=Path, help='rosbag2 folder, .mcap, .db3 or .bag file, or a '
+                        'file with the payload of one message')
+
+
+def _inspect(options: Namespace) -> None:
+    from adversarial_lcd_ros.inspection import inspect_bag, inspect_payload
+    from adversarial_lcd_ros.sequences.bagfile import is_bag
+
+    if options.path.is_file() and not is_bag(options.path):
+        _show_payload(*inspect_payload(options.path))
+    else:
+        _show_bag(inspect_bag(options.path))
+
+
+def _show_bag(bag: BagSummary) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    topics = Table('topic', 'type', 'messages', 'payload',
+                   title=f'{bag.path}: {bag.duration_s:.1f} s', title_justify='left')
+    graphs = Table('topic', 'nodes n', 'edges m', 'objects',
+                   title='graphs: mean (least to largest)', title_justify='left')
+    for topic in bag.topics:
+        topics.add_row(topic.name, topic.type, str(topic.count), topic.payload)
+        if topic.graphs:
+            sizes = (topic.graphs.nodes, topic.graphs.edges, topic.graphs.objects)
+            graphs.add_row(topic.name, *(f'{mean:.1f} ({least:.0f} to {largest:.0f})'
+                                         for least, mean, largest in sizes))
+    console.print(topics)
+    if graphs.row_count:
+        console.print(graphs)
+
+
+def _show_payload(name: str, content: Any) -> None:
+    from rich.console import Console
+
+    from adversarial_lcd_ros.graph import MultiTierGraph
+
+    console = Console(highlight=False)
+    graph = content if isinstance(content, MultiTierGraph) else getattr(content, 'graph', None)
+    if graph is None:
+        console.print(content, soft_wrap=True)
+        return
+    number = f' {content.id}' if graph is not content else ''
+    console.print(f'{name}{number}: n = {graph.node_count}, m = {graph.edge_count}, '
+                  f'{graph.object_count} objects, {graph.width} x {graph.height} pixels, '
+                  f'sequence {graph.sequence}, stamp {graph.stamp_ns} ns, frame '
+                  f'{graph.frame_id!r}', soft_wrap=True)
