@@ -165,6 +165,14 @@ def test_what_is_no_image_is_refused_and_the_next_frame_is_built(builder, image)
     assert builder.build(texture(), 0).node_count == 50
 
 
+def test_frames_begun_side_by_side_give_the_graphs_they_give_alone(builder):
+    images = [texture(seed) for seed in range(4)]
+    with GraphBuilder(builder.config, frames_at_once=3) as other:
+        begun = [other.begin(image, stamp) for stamp, image in enumerate(images)]
+        assert [building.graph() for building in begun] == [
+            builder.build(image, stamp) for stamp, image in enumerate(images)]
+
+
 def test_a_builder_without_its_model_does_not_start(tmp_path):
     with pytest.raises(ModelError, match='fetch-model'):
         GraphBuilder(BuilderConfig(model=str(tmp_path / 'none.onnx')))

@@ -1,6 +1,7 @@
 """The node graph_builder: every encoding, both transports, any camera's QoS, bad frames."""
 
 from array import array
+from concurrent.futures import Future
 
 import cv2
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig
-from adversarial_lcd_ros.vision.builder import GraphBuilder
+from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.draw import draw_graph
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
@@ -105,6 +107,29 @@ def test_a_frame_offered_raw_and_compressed_is_used_once(ros, node, graphs):
     ros.until(lambda: len(graphs) == 4)
     assert sorted(graph.stamp_ns // 10**9 for graph in graphs) == [0, 1, 2, 3]
     assert node.diagnostics['dropped repeats'] == 4
+
+
+def test_graphs_leave_in_the_order_of_their_frames(ros, node, graphs, core, monkeypatch):
+    sought = [Future() for _ in range(3)]
+
+    def begin(image, stamp_ns, frame_id, sequence):
+        graph = core.build(image, stamp_ns, frame_id, sequence)
+        return Building(sought[sequence], lambda _: graph)
+
+    monkeypatch.setattr(node._builder, 'begin', begin)
+    camera = ros.publisher('image', Image)
+    publish(ros, camera, image_message(picture(), second=0), image_message(picture(), second=1))
+    ros.until(lambda: node.diagnostics['received frames'] == 2)
+    sought[1].set_result(None)
+    ros.until(lambda: len(node._under_way) == 2)
+    assert not graphs
+    sought[0].set_result(None)
+    ros.until(lambda: len(graphs) == 2)
+    assert [graph.sequence for graph in graphs] == [0, 1]
+    camera.publish(image_message(picture(), second=2))
+    sought[2].set_exception(ModelError('the network fails'))
+    ros.until(lambda: node.diagnostics['refused frame'] == 1)
+    assert len(graphs) == 2
 
 
 def bad_frames():
