@@ -8,6 +8,7 @@ from pathlib import Path
 from adversarial_lcd_ros.errors import ModelError
 
 PACKAGE = 'adversarial_lcd_ros'
+OBJECT_MODEL = 'picodet_s_coco.onnx'
 _HERE = Path(__file__).resolve().parent
 
 
@@ -50,3 +51,8 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
     return Path(base) / PACKAGE
+
+
+def object_model_path() -> Path:
+    """Return where "adversarial-lcd fetch-model" puts the object model; it may not be there."""
+    return cache_folder() / 'models' / OBJECT_MODEL

@@ -24,9 +24,8 @@ from zipfile import ZipFile
 import yaml
 
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.paths import cache_folder
+from adversarial_lcd_ros.paths import OBJECT_MODEL, object_model_path
 
-MODEL_NAME = 'picodet_s_coco.onnx'
 MODEL_SHA256 = '4c762b2b52fda654ed5372f30bbb501891f647e1a782f8ccee88976e299f8a41'
 SOURCE = 'paddlelabel-ml==1.0.0'
 SOURCE_FOLDER = 'paddlelabel_ml/model/PicoDet/ckpt'
@@ -51,11 +50,6 @@ paddle2onnx.export(*sys.argv[2:5], opset_version=int(sys.argv[5]))
 Progress = Callable[[str], None]
 
 
-def default_model_path() -> Path:
-    """Return where the provisioned object model is, or will be; nothing is read or written."""
-    return cache_folder() / 'models' / MODEL_NAME
-
-
 def fetch_object_model(destination: Path | None = None, progress: Progress | None = None) -> Path:
     """
     Return the path of the default object model, after fetching it where it is not yet there.
@@ -67,7 +61,7 @@ def fetch_object_model(destination: Path | None = None, progress: Progress | Non
     Parameters
     ----------
     destination : Path, optional
-        File to write; ``default_model_path()`` if not given.
+        File to write; ``paths.object_model_path()`` if not given.
     progress : callable, optional
         Is told in a few words what is being done.
 
@@ -78,7 +72,7 @@ def fetch_object_model(destination: Path | None = None, progress: Progress | Non
         converter, or a checksum is wrong.
 
     """
-    path = default_model_path() if destination is None else Path(destination)
+    path = object_model_path() if destination is None else Path(destination)
     tell = progress or (lambda _: None)
     if path.exists():
         _check_sha256(path, MODEL_SHA256, f'delete {path} and fetch it again')
@@ -104,7 +98,7 @@ def _make_model(work: Path, path: Path, tell: Progress) -> None:
     wheel = _download(CONVERTER, work / 'converter', '--python-version', version)
     converter = _unpack(wheel, work / 'converter', 'paddle2onnx')
     tell('converting to ONNX')
-    made = work / MODEL_NAME
+    made = work / OBJECT_MODEL
     _run([python, '-I', '-S', '-c', _CONVERT, str(converter.parent),
           *(str(source / name) for name in SOURCE_SHA256), str(made), str(OPSET)], CONVERTER)
     _check_sha256(made, MODEL_SHA256, f'{CONVERTER} is not what it was: report it')
@@ -171,7 +165,7 @@ def _converter_python(path: Path) -> tuple[str, str]:
     raise ModelError(
         f'{CONVERTER} has wheels for Python {", ".join(CONVERTER_PYTHONS)}; this is Python '
         f'{platform.python_version()}, and none of those is on the path: install one, or run '
-        f'"adversarial-lcd fetch-model" where there is one and copy {MODEL_NAME} to {path}')
+        f'"adversarial-lcd fetch-model" where there is one and copy {OBJECT_MODEL} to {path}')
 
 
 def _pythons() -> Iterator[tuple[str, str]]:

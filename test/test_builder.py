@@ -11,9 +11,10 @@ import pytest
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
+from adversarial_lcd_ros.paths import object_model_path
 from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
 from adversarial_lcd_ros.vision.features import Features
-from adversarial_lcd_ros.vision.objects import Detections, default_model_path
+from adversarial_lcd_ros.vision.objects import Detections
 
 NO_WORDS = (np.zeros(0, np.uint32), np.zeros(0, np.float32))
 
@@ -181,7 +182,7 @@ def test_a_builder_without_its_model_does_not_start(tmp_path):
 
 
 def test_a_real_frame_gives_objects_features_and_the_same_graph_again(shared_data):
-    if not default_model_path().is_file():
+    if not object_model_path().is_file():
         pytest.skip('the object model has not been fetched')
     image = cv2.imread(str(sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))[808]))
     with GraphBuilder() as builder:

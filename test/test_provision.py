@@ -10,7 +10,7 @@ import pytest
 
 from adversarial_lcd_ros import provision
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.vision import objects
+from adversarial_lcd_ros.paths import object_model_path
 
 WEIGHTS, NETWORK, CONVERTED = b'weights', b'network', b'converted model'
 # What the stand-in for the converter does: it fails where PyPI's ROS libraries would be loaded.
@@ -135,5 +135,4 @@ def test_folder_that_cannot_be_written_is_named(registry, tmp_path):
 
 def test_model_is_put_where_the_builder_looks(monkeypatch, tmp_path):
     monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path))
-    assert provision.default_model_path() == tmp_path / 'models' / 'picodet_s_coco.onnx'
-    assert provision.default_model_path() == objects.default_model_path()
+    assert object_model_path() == tmp_path / 'models' / 'picodet_s_coco.onnx'

@@ -7,9 +7,8 @@ from typing import Any
 
 UNDEFINED = 'n/a'
 _NARROW_SPACE = '\u202f'  # does not break the line
-_PERTURBATION = {'eigencentrality': 'eigencentrality', 'random_walk': 'random walk',
-                 'shortest_path': 'shortest path', 'random_flip': 'random flips'}
-_SURROGATE = {'svm_rbf': 'SVM-RBF', 'none': 'no surrogate'}
+_SURROGATE = {'svm_rbf': 'SVM-RBF', 'svm_linear': 'SVM-linear', 'svm_poly': 'SVM-polynomial',
+              'naive_bayes': 'naive Bayes', 'svr': 'SVR', 'ard': 'Bayesian ARD'}
 _MODE = {'query': 'query-guided', 'surrogate': 'surrogate only', 'pass': 'forwarded unchanged'}
 
 Attack = Mapping[str, Any]
@@ -21,10 +20,10 @@ def attack_title(attack: Attack) -> str:
         return str(attack['name'])
     if attack['mode'] == 'pass':
         return 'control: forwarded unchanged'
-    perturbation = _PERTURBATION.get(attack['perturbation'],
-                                     attack['perturbation'].replace('_', ' '))
-    surrogate = _SURROGATE.get(attack['surrogate'], attack['surrogate'].replace('_', '-'))
-    return f'{perturbation} + {surrogate}, {_MODE.get(attack["mode"], attack["mode"])}'
+    parts = [attack['perturbation'].replace('_', ' ')]
+    if attack['surrogate'] != 'none':
+        parts.append(_SURROGATE.get(attack['surrogate'], attack['surrogate'].replace('_', ' ')))
+    return f'{" + ".join(parts)}, {_MODE.get(attack["mode"], attack["mode"])}'
 
 
 def percent(value: float | None, digits: int = 1) -> str:

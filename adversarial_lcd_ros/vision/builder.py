@@ -13,12 +13,11 @@ from scipy.spatial import cKDTree
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, OBJECT_TIER, MultiTierGraph
-from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.paths import model_path, object_model_path
 from adversarial_lcd_ros.vision.features import FeatureExtractor, Features, spread, to_grey
 from adversarial_lcd_ros.vision.objects import (
     Detections,
     ObjectDetector,
-    default_model_path,
     filter_objects,
 )
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
@@ -77,7 +76,7 @@ class GraphBuilder:
                                           self.config.fast_threshold)
         self._objects: ObjectDetector | None = None
         if self.config.detector == 'onnx':
-            model = Path(self.config.model) if self.config.model else default_model_path()
+            model = Path(self.config.model) if self.config.model else object_model_path()
             self._objects = ObjectDetector(model, self.config.object_score, self.config.threads)
         self._threads = ThreadPoolExecutor(frames_at_once, 'objects')
 

@@ -15,7 +15,6 @@ import onnxruntime
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.paths import cache_folder
 
 # RGB, for grey levels from 0 to 1.
 IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
@@ -34,11 +33,6 @@ COCO_CLASSES = (
     'potted plant', 'bed', 'dining table', 'toilet', 'tv', 'laptop', 'mouse', 'remote',
     'keyboard', 'cell phone', 'microwave', 'oven', 'toaster', 'sink', 'refrigerator', 'book',
     'clock', 'vase', 'scissors', 'teddy bear', 'hair drier', 'toothbrush')
-
-
-def default_model_path() -> Path:
-    """Return where "adversarial-lcd fetch-model" puts the object model."""
-    return cache_folder() / 'models' / 'picodet_s_coco.onnx'
 
 
 @dataclass(frozen=True)
