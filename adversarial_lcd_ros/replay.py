@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.codec import MESSAGES, schema_text, typestore
 from adversarial_lcd_ros.config import ReplayConfig
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import CodecError, SequenceError
 from adversarial_lcd_ros.paths import PACKAGE
+from adversarial_lcd_ros.payload import unwrap
 from adversarial_lcd_ros.sequences.bagfile import (
     COMPRESSED_IMAGE,
     IMAGE,
@@ -161,11 +162,9 @@ def _with_stamp(message_type: str, wire: bytes, stamp_ns: int) -> bytes:
 
 def _payload(wire: bytes) -> bytes:
     try:
-        message: Any = typestore().deserialize_cdr(wire, PAYLOAD)
-    except Exception as error:
-        # rosbags reports most damage as SerdeError, the rest as whatever broke inside it.
-        raise SequenceError(f'{len(wire)} bytes are no {PAYLOAD}: {error!r}') from error
-    return bytes(message.data)
+        return unwrap(wire)
+    except CodecError as error:
+        raise SequenceError(str(error)) from error
 
 
 def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:

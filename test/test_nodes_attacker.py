@@ -14,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from adversarial_lcd_ros.nodes.attacker import AttackerNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+from adversarial_lcd_ros.payload import unwrap, wrap
 
 
 class Line:

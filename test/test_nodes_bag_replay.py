@@ -20,7 +20,7 @@ from adversarial_lcd_ros.nodes.attacker import AttackerNode
 from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.graph_builder import GraphBuilderNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+from adversarial_lcd_ros.payload import unwrap, wrap
 
 PERIOD_NS, FRAMES = 200_000_000, 15
 STAMPS = [5_000_000_000 + k * PERIOD_NS for k in range(FRAMES)]

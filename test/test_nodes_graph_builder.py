@@ -20,7 +20,7 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from adversarial_lcd_ros.nodes.graph_builder import GraphBuilderNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.nodes.payload import unwrap
+from adversarial_lcd_ros.payload import unwrap
 
 
 def picture(seed=0, height=120, width=160):

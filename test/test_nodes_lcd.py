@@ -12,7 +12,7 @@ from adversarial_lcd_ros import codec
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+from adversarial_lcd_ros.payload import unwrap, wrap
 
 SECOND = 1_000_000_000
 EDGES = [(0, 1), *((0, k) for k in range(2, 12)), *((k, k + 1) for k in range(2, 39))]

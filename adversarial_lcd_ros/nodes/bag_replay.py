@@ -18,9 +18,9 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError, ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
-from adversarial_lcd_ros.nodes.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
+from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 

@@ -22,8 +22,8 @@ from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
-from adversarial_lcd_ros.nodes.payload import wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.payload import wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.draw import draw_graph

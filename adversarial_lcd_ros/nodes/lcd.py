@@ -17,8 +17,8 @@ from adversarial_lcd_ros.nodes.endpoints import (
     create_payload_publisher,
     payload_qos,
 )
-from adversarial_lcd_ros.nodes.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 

@@ -16,7 +16,7 @@ from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
 from adversarial_lcd_ros.nodes.endpoints import create_payload_publisher, payload_qos
-from adversarial_lcd_ros.nodes.payload import unwrap, wrap
+from adversarial_lcd_ros.payload import unwrap, wrap
 
 _LOOK_S = 0.01
 
