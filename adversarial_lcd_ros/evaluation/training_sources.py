@@ -73,6 +73,22 @@ class TrainingSource:
                                 'PATH@FROM:TO, such as PATH@0:0.5 for the first half')
         return cls(Path(found['path']), float(found['start']), float(found['stop']))
 
+    def numbers(self, frame_count: int) -> range:
+        """
+        Return which of the frames of the sequence belong to the part.
+
+        Raises
+        ------
+        SequenceError
+            None does.
+
+        """
+        numbers = range(int(frame_count * self.start), int(frame_count * self.stop))
+        if not numbers:
+            raise SequenceError(f'part {self.start:g}:{self.stop:g} of {self.path}, which has '
+                                f'{frame_count} frames, holds none: expected a larger part')
+        return numbers
+
 
 @dataclass(frozen=True, eq=False)
 class TrainingFrames:
@@ -160,12 +176,8 @@ def open_source(source: TrainingSource) -> TrainingFrames:
         raise SequenceError(f'{source.path} has no ground truth: training needs it to know the '
                             'loops; put a groundtruth.txt beside the frames, or import the '
                             'sequence with --ground-truth')
-    count = sequence.frame_count
-    numbers = range(int(count * source.start), int(count * source.stop))
-    if not numbers:
-        raise SequenceError(f'part {source.start:g}:{source.stop:g} of {source.path}, which has '
-                            f'{count} frames, holds none: expected a larger part')
-    return TrainingFrames(source, sequence, sequence.trajectory, numbers, _terms(source.path))
+    return TrainingFrames(source, sequence, sequence.trajectory,
+                          source.numbers(sequence.frame_count), _terms(source.path))
 
 
 def with_licences(sources: list[TrainingSource], licences: list[str]) -> list[TrainingSource]:

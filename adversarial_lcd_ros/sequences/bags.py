@@ -54,6 +54,21 @@ def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None)
     return Sequence(path.resolve().stem, path, stamps, size, trajectory, read)
 
 
+def bag_trajectory(path: Path, camera_frame: str = '') -> Trajectory | None:
+    """
+    Return the ground truth of a bag, with or without images; None where it has none.
+
+    Parameters
+    ----------
+    path : Path
+    camera_frame : str
+        The camera's frame on /tf, where that is all there is.
+
+    """
+    with BagFile(path) as bag:
+        return _trajectory(bag, None, camera_frame)
+
+
 def _what(path: Path, topic: str, number: int) -> str:
     return f'{path}: frame {number} on {topic}'
 

@@ -1,0 +1,131 @@
+"""Graphs on disk, under a digest of everything that they were made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+from dataclasses import asdict
+import hashlib
+import json
+import os
+from pathlib import Path
+import tempfile
+from zipfile import BadZipFile
+
+import cv2
+import numpy as np
+import onnxruntime
+import scipy
+
+from adversarial_lcd_ros import vision
+from adversarial_lcd_ros.codec import decode_graph, encode_graph, schema_text
+from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.errors import CodecError, EvaluationError, ModelError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.paths import model_path, object_model_path
+from adversarial_lcd_ros.sequences import Sequence
+
+# What decides on the bytes of a graph beside the code of this package.
+_LIBRARIES = (np, scipy, cv2, onnxruntime)
+# Threads change how long a graph takes, not what it is.
+_IRRELEVANT = ('threads',)
+
+
+def cache_key(sequence: Sequence, numbers: range, config: BuilderConfig) -> str:
+    """
+    Return a digest of all that the graphs of some frames are made of, hexadecimal.
+
+    The source and its stamps, its first picture as recorded, the settings, the bytes of the
+    files that the settings name, the code that builds graphs, and the libraries below it.
+
+    Parameters
+    ----------
+    sequence : Sequence
+    numbers : range
+        The frames.
+    config : BuilderConfig
+
+    """
+    settings = {name: value for name, value in asdict(config).items() if name not in _IRRELEVANT}
+    first = next(sequence.frames(numbers.start, numbers.start + 1))
+    parts = [
+        json.dumps({
+            'source': str(sequence.source.resolve()), 'frames': [numbers.start, numbers.stop],
+            'image_size': sequence.image_size, 'settings': settings,
+            'libraries': [library.__version__ for library in _LIBRARIES]},
+            sort_keys=True).encode(),
+        sequence.stamps_ns[numbers.start:numbers.stop].tobytes(), first.data,
+        schema_text('MultiTierGraph').encode(),
+        *(_bytes(path) for path in (*_named_files(config), *_code()))]
+    digest = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        # With its length, so that no two lists of parts run into the same bytes.
+        digest.update(len(part).to_bytes(8, 'little') + part)
+    return digest.hexdigest()
+
+
+def _named_files(config: BuilderConfig) -> list[Path]:
+    files = [Path(config.vocabulary) if config.vocabulary else model_path('vocabulary.npz')]
+    if config.detector == 'onnx':
+        files.append(Path(config.model) if config.model else object_model_path())
+    return files
+
+
+def _code() -> list[Path]:
+    return [path for folder in vision.__path__ for path in sorted(Path(folder).glob('*.py'))]
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ModelError(f'{path} cannot be read: {error}; "adversarial-lcd fetch-model" provides '
+                         'the default object model, "adversarial-lcd train" a vocabulary'
+                         ) from error
+
+
+def save_graphs(path: Path, graphs: Several[MultiTierGraph]) -> None:
+    """
+    Write graphs as npz: their payloads one after the other, and the length of each.
+
+    The file appears under its name when it is complete, or not at all.
+
+    Raises
+    ------
+    EvaluationError
+        The place cannot be written.
+
+    """
+    payloads = [encode_graph(graph) for graph in graphs]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix='.graphs-', dir=path.parent) as hidden:
+            work = Path(hidden) / path.name
+            np.savez(work, payload=np.frombuffer(b''.join(payloads), np.uint8),
+                     length=np.array([len(payload) for payload in payloads], np.int64))
+            os.replace(work, path)
+    except OSError as error:
+        raise EvaluationError(f'graphs cannot be kept in {path.parent} ({error}): name another '
+                              'folder, or set ADVERSARIAL_LCD_CACHE') from error
+
+
+def load_graphs(path: Path) -> list[MultiTierGraph]:
+    """
+    Read graphs that ``save_graphs`` wrote; every array is checked anew.
+
+    Raises
+    ------
+    EvaluationError
+        The file is damaged, or something else.
+
+    """
+    try:
+        # The checksums of the archive find what was damaged; the codec, what never was a graph.
+        with np.load(path, allow_pickle=False) as arrays:
+            payload, length = arrays['payload'].tobytes(), arrays['length']
+        ends = np.cumsum(length)
+        if len(ends) and (length.min() < 0 or ends[-1] != len(payload)):
+            raise ValueError(f'{len(payload)} bytes for graphs of {ends[-1]}')
+        return [decode_graph(payload[end - size:end])
+                for size, end in zip(length.tolist(), ends.tolist(), strict=True)]
+    except (OSError, EOFError, TypeError, ValueError, KeyError, BadZipFile, CodecError) as error:
+        raise EvaluationError(f'{path} holds no graphs: {error!r}; delete it') from error
