@@ -2,8 +2,13 @@
 
 from pathlib import Path
 
+from hypothesis import settings
 import pytest
 from ros_fixtures import lcd_model, ros, vocabulary  # noqa: F401
+
+# The first call of a compiled function compiles it, whichever example that is.
+settings.register_profile('compiling', deadline=None)
+settings.load_profile('compiling')
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / 'shared' / 'data'
 

@@ -1,6 +1,6 @@
 """Compiled Hamming distances, against unpacked bits."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 import numpy as np
@@ -18,8 +18,6 @@ def distances(a, b):
     return np.unpackbits(a[:, None] ^ b[None], axis=2).sum(axis=2)
 
 
-# The first call compiles.
-@settings(deadline=None)
 @given(descriptors(0), descriptors(1))
 def test_the_nearest_is_the_first_with_fewest_differing_bits(a, b):
     index, distance = nearest(lanes(a), lanes(b))
@@ -28,8 +26,6 @@ def test_the_nearest_is_the_first_with_fewest_differing_bits(a, b):
     assert distance.tolist() == expected.min(axis=1).tolist()
 
 
-# The first call compiles.
-@settings(deadline=None)
 @given(descriptors(1), descriptors(1), st.integers(0, 256))
 def test_mutual_pairs_are_nearest_both_ways_and_near_enough(a, b, farthest):
     first, second, distance = mutual(lanes(a), lanes(b), farthest)
