@@ -1,0 +1,130 @@
+"""The paper's printed statistics, from its printed cells."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.paper_ranks import rank_methods
+from adversarial_lcd_ros.evaluation.paper_tables import (
+    AUTORANK_TABLE,
+    BUDGET_TABLE,
+    OURS,
+    PERTURBATION_TABLE,
+    SURROGATE_TABLE,
+    misprints,
+    repaired_surrogate_table,
+)
+
+
+def ranking_of(columns):
+    return rank_methods({name: {str(row): -cell for row, cell in enumerate(cells)}
+                         for name, cells in columns.items()})
+
+
+def cut(value, digits):
+    """Decimals cut off, as in Table 4: 13 / 6 is printed as 2.16."""
+    return math.trunc(value * 10 ** digits + math.copysign(1e-9, value)) / 10 ** digits
+
+
+def autorank_of(columns):
+    """Table 4 as the paper made it: rank k is the best, medians keep their sign."""
+    ranking = ranking_of(columns)
+    return {method.name: (cut(len(columns) + 1 - method.mean_rank, 2), cut(-method.median, 2),
+                          cut(method.mad, 2), cut(method.gamma, 1))
+            for method in ranking.methods}
+
+
+def printed(name):
+    row = AUTORANK_TABLE[name]
+    return row.mean_rank, row.median, row.mad, row.gamma
+
+
+def test_six_rows_reproduce_the_printed_autorank_table():
+    """Five data sets and their own average, with the one cell repaired: every figure agrees."""
+    computed = autorank_of(repaired_surrogate_table().with_average())
+    assert list(computed) == list(AUTORANK_TABLE)
+    assert computed == {name: printed(name) for name in AUTORANK_TABLE}
+
+
+def test_five_rows_do_not_reproduce_it():
+    for table in (SURROGATE_TABLE, repaired_surrogate_table()):
+        computed = autorank_of(table.columns)
+        assert [name for name in computed if computed[name] == printed(name)] == []
+
+
+def test_printed_cells_alone_miss_where_the_misprint_is():
+    computed = autorank_of(SURROGATE_TABLE.with_average())
+    assert computed['SVM-linear'] == printed('SVM-linear')
+    assert computed[OURS] == printed(OURS)
+    # Medians do not depend on the misprint in another column, ranks do.
+    assert computed['Bayesian'][1:] == printed('Bayesian')[1:]
+    assert computed['Bayesian'][0] == 3.16
+    assert computed['SVM-poly'] == (2.0, -18.57, 0.91, -4.0)
+
+
+def test_printed_intervals_are_the_two_middle_values_of_six():
+    for name, cells in repaired_surrogate_table().with_average().items():
+        middle = sorted(cells)[2:4]
+        assert AUTORANK_TABLE[name].interval == tuple(cut(cell, 1) for cell in middle)
+    # Such an interval covers the median in 31 of 100 cases.
+    assert binom.pmf(3, 6, 0.5) == pytest.approx(0.3125)
+
+
+@pytest.mark.parametrize(('columns', 'count', 'difference'), [
+    (repaired_surrogate_table().with_average(), 6, 1.915),
+    (repaired_surrogate_table().columns, 5, 2.098),
+    (SURROGATE_TABLE.columns, 5, 2.098)])
+def test_only_svm_linear_is_separated(columns, count, difference):
+    """The paper: "a critical difference between Adversarial-LCD and the other algorithms"."""
+    ranking = ranking_of(columns)
+    assert len(ranking.sequences) == count
+    assert ranking.critical_difference == pytest.approx(difference, abs=0.0005)
+    assert ranking.p_value < 0.05
+    assert [name for name in SURROGATE_TABLE.columns if name != OURS
+            and ranking.separated(OURS, name)] == ['SVM-linear']
+
+
+def test_rank_gaps_of_the_printed_table():
+    best = AUTORANK_TABLE[OURS].mean_rank
+    gaps = {name: best - row.mean_rank for name, row in AUTORANK_TABLE.items()}
+    assert gaps == pytest.approx({OURS: 0, 'Bayesian': 0.83, 'SVM-poly': 1.67,
+                                  'SVM-linear': 2.83}, abs=0.005)
+
+
+def test_misprinted_averages():
+    averages = {(found.table, found.what.removeprefix('average of ')):
+                (found.printed, round(found.computed, 2))
+                for found in misprints() if found.what.startswith('average')}
+    assert averages == {
+        (3, 'SVM-poly'): (-18.50, -18.70), (5, 'Random Walk'): (-16.548, -16.78),
+        (5, 'Shortest Path'): (-22.36, -22.97), (6, 'Shortest Path'): (-12.95, -12.99),
+        (6, 'Eigencentrality'): (-16.09, -16.42)}
+
+
+def test_leads_claimed_in_the_text():
+    leads = {(found.table, found.what.split()[2]): (found.printed, round(found.computed, 2))
+             for found in misprints() if found.what.startswith('lead')}
+    assert leads == {(3, 'SVM-poly'): (7.3, 7.76), (5, 'Shortest'): (4.0, 3.50),
+                     (6, 'Random'): (7.9, 8.26), (6, 'Shortest'): (3.1, 3.43)}
+
+
+def test_the_repair_explains_average_and_lead_but_not_the_printed_average():
+    table = repaired_surrogate_table()
+    assert table.averages['SVM-poly'] == -19.10
+    assert cut(table.mean('SVM-poly') - table.mean(OURS), 1) == 7.3
+    assert SURROGATE_TABLE.averages['SVM-poly'] == -18.50  # neither -18.70 nor -19.10
+
+
+def test_tables_share_the_cells_they_should_share():
+    assert SURROGATE_TABLE.columns[OURS] == PERTURBATION_TABLE.columns['Eigencentrality']
+    for name, cells in BUDGET_TABLE.columns.items():
+        assert cells[-1] == PERTURBATION_TABLE.columns[name][0]
+    assert np.all(np.diff(list(BUDGET_TABLE.columns.values()), axis=1) < 0)
+
+
+def test_correction_of_a_cell_that_is_not_there():
+    with pytest.raises(EvaluationError, match='no cell'):
+        SURROGATE_TABLE.corrected('SVM-poly', 'attic', -1.0)
