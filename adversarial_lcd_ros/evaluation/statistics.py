@@ -85,26 +85,44 @@ def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> Interv
     return float(interval.low), float(interval.high)
 
 
-def _interval(kind: NDArray[np.int8], value: NDArray[np.int64], block: int, seed: int,
-              replicates: int, level: float) -> Interval | None:
-    # Mean over the classes of the mean value in the class.
-    count = len(kind)
+def class_mean_interval(size: NDArray[np.int64], total: NDArray[np.int64], block: int, seed: int,
+                        replicates: int = REPLICATES, level: float = LEVEL) -> Interval | None:
+    """
+    Return the interval of the mean over two classes of the mean value in each.
+
+    Parameters
+    ----------
+    size, total : int64, (2, n)
+        How many values of each class a frame has (several where runs are repeated, none where
+        it is not scored), and their sum.
+    block, seed, replicates, level
+        As for ``balanced_accuracy_interval``; None if a class is empty.
+
+    """
+    count = size.shape[1]
     if not 1 <= block <= count:
         raise EvaluationError(f'blocks of {block} frames in {count}: expected 1 to {count}')
-    if not (np.any(kind == POSITIVE) and np.any(kind == NEGATIVE)):
+    if not np.all(size.sum(axis=1)):
         return None
     start = np.random.default_rng(seed).integers(
         count, size=(replicates, -(-count // block)), dtype=np.int32)
     means = []
-    for member in (kind == POSITIVE, kind == NEGATIVE):
-        size = _block_sums(member.astype(np.int64), block)[start].sum(axis=1)
-        total = _block_sums(np.where(member, value, 0), block)[start].sum(axis=1)
-        means.append(np.divide(total, size, out=np.full(replicates, np.nan), where=size > 0))
+    for sizes, totals in zip(size, total, strict=True):
+        drawn = _block_sums(sizes, block)[start].sum(axis=1)
+        value = _block_sums(totals, block)[start].sum(axis=1)
+        means.append(np.divide(value, drawn, out=np.full(replicates, np.nan), where=drawn > 0))
     # A replicate that missed a class altogether has no balanced accuracy.
     estimate = (means[0] + means[1]) / 2
     tail = (1.0 - level) / 2
     low, high = np.nanquantile(estimate, [tail, 1.0 - tail])
     return float(low), float(high)
+
+
+def _interval(kind: NDArray[np.int8], value: NDArray[np.int64], block: int, seed: int,
+              replicates: int, level: float) -> Interval | None:
+    member = np.stack([kind == POSITIVE, kind == NEGATIVE])
+    return class_mean_interval(member.astype(np.int64), np.where(member, value, 0), block, seed,
+                               replicates, level)
 
 
 def _block_sums(value: NDArray[np.int64], block: int) -> NDArray[np.int64]:
