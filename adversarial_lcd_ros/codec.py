@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 SCHEMA_VERSION = 1
-MESSAGES = ('MultiTierGraph', 'LoopClosure', 'LcdQuery', 'LcdAnswer', 'AttackReport')
+MESSAGES = ('MultiTierGraph', 'LoopClosure', 'LcdQuery', 'LcdAnswer', 'AttackReport',
+            'Detections')
 MAX_NODES = 100_000
 MAX_PAYLOAD_BYTES = 64 * 1024 * 1024
 _NS = 1_000_000_000
@@ -112,6 +113,31 @@ class AttackReport:
     loss_before: float = 0.0
     loss_after: float = 0.0
     duration_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FrameDetections:
+    """
+    What a detector of the user's own has found in one frame.
+
+    Attributes
+    ----------
+    stamp_ns, frame_id
+        Of the frame.
+    label : uint32, (k,)
+        Class.
+    box : float32, (k, 4)
+        x, y of the upper left corner, width, height, pixels; may reach beyond the image.
+    score : float32, (k,)
+        Confidence, 0 to 1.
+
+    """
+
+    stamp_ns: int
+    frame_id: str
+    label: NDArray[np.uint32]
+    box: NDArray[np.float32]
+    score: NDArray[np.float32]
 
 
 def schema_text(message: str) -> str:
@@ -299,6 +325,40 @@ def decode_attack_report(payload: bytes | bytearray | memoryview) -> AttackRepor
     return AttackReport(
         stamp_ns=_stamp_ns(message.header.stamp), frame_id=message.header.frame_id,
         **{name: getattr(message, name) for name in _REPORT_FIELDS})
+
+
+def encode_detections(detections: FrameDetections) -> bytes:
+    """Return the CDR of Detections.msg."""
+    return _dump(_type(f'{PACKAGE}/msg/Detections')(
+        header=_header(detections.stamp_ns, detections.frame_id), schema_version=SCHEMA_VERSION,
+        label=detections.label, box=detections.box.ravel(), score=detections.score),
+        'Detections')
+
+
+def decode_detections(payload: bytes | bytearray | memoryview) -> FrameDetections:
+    """
+    Return the detections in a payload after counts and ranges have been checked.
+
+    Raises
+    ------
+    CodecError
+        The payload is no Detections, or one that contradicts itself.
+
+    """
+    message = _load(payload, 'Detections')
+    count = len(message.label)
+    if count > MAX_NODES:
+        raise CodecError(f'{count} detections in a frame: at most {MAX_NODES} are accepted')
+    if (len(message.box), len(message.score)) != (4 * count, count):
+        raise CodecError(f'{count} labels with {len(message.box)} values of box and '
+                         f'{len(message.score)} scores: expected {4 * count} and {count}')
+    box = message.box.reshape(-1, 4)
+    if not (np.isfinite(box).all() and (box[:, 2:] > 0).all()):
+        raise CodecError('box that is not finite, or without width or height')
+    if not ((message.score >= 0) & (message.score <= 1)).all():
+        raise CodecError('score: expected 0 to 1')
+    return FrameDetections(_stamp_ns(message.header.stamp), message.header.frame_id,
+                           message.label, box, message.score)
 
 
 def _check_probability(probability: float) -> None:

@@ -98,7 +98,15 @@ class BuilderConfig(Config):
     feature_neighbours: int = setting(
         6, 'Nearest features that a feature is joined with (k).', low=0, high=50)
     detector: str = setting(
-        'onnx', 'Where objects come from: the network, or none.', choices=('onnx', 'none'))
+        'onnx', 'Where objects come from: the network (onnx), nowhere (none), a file of recorded '
+        'detections (csv), or, in the node, the topic detections (topic).',
+        choices=('onnx', 'none', 'csv', 'topic'))
+    detections: str = setting(
+        '', 'Detector csv: file with the columns timestamp,class,x,y,w,h,score; empty: the '
+        'detections.csv of a sequence that has no images.')
+    detections_tolerance_s: float = setting(
+        0.01, 'Detectors csv and topic: largest offset in time between a frame and its '
+        'detections, seconds.', low=0.0, high=1e3)
     model: str = setting(
         '', 'ONNX object model; empty: the one that "adversarial-lcd fetch-model" provisions.')
     vocabulary: str = setting('', 'Visual vocabulary (npz); empty: the one that ships.')
@@ -268,6 +276,9 @@ class GraphBuilderNodeConfig(Config):
     frames_at_once: int = setting(
         2, 'Frames whose objects are looked for side by side; graphs leave in the order of '
         'their frames.', low=1, high=64)
+    detections_wait_ms: float = setting(
+        300.0, 'Detector topic: a frame waits so long for its detections, milliseconds; then its '
+        'graph goes out without objects. At most queue_depth frames wait.', low=0.0, high=1e6)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
     'LcdQuery': codec.decode_query,
     'LcdAnswer': codec.decode_answer,
     'AttackReport': codec.decode_attack_report,
+    'Detections': codec.decode_detections,
 }
 
 

@@ -228,7 +228,6 @@ def test_options_that_do_not_apply_are_refused(tum, options, message):
 
 def test_what_a_tum_folder_lacks_is_named(tum):
     (tum / 'rgb.txt').unlink()
-    (tum / 'detections.csv').write_text('0 1 2 3 4 5\n')
     with pytest.raises(SequenceError, match=r'has a groundtruth\.txt but no rgb\.txt'):
         open_sequence(tum)
     assert open_sequence(tum / 'rgb').frame_count == 4

@@ -67,6 +67,8 @@ def _named_files(config: BuilderConfig) -> list[Path]:
     files = [Path(config.vocabulary) if config.vocabulary else model_path('vocabulary.npz')]
     if config.detector == 'onnx':
         files.append(Path(config.model) if config.model else object_model_path())
+    if config.detector == 'csv' and config.detections:
+        files.append(Path(config.detections))
     return files
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 import logging
 from pathlib import Path
+from typing import TypeVar
 
 from adversarial_lcd_ros.codec import decode_graph
 from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
-from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.evaluation.graph_cache import cache_key, load_graphs, save_graphs
 from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -19,10 +21,13 @@ from adversarial_lcd_ros.replay import Replay, read_payloads
 from adversarial_lcd_ros.sequences import Sequence, Trajectory, open_sequence
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, PAYLOAD, BagFile, is_bag
 from adversarial_lcd_ros.sequences.bags import bag_trajectory
-from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
+from adversarial_lcd_ros.sequences.detections import read_detections
+from adversarial_lcd_ros.sequences.frame import NO_PICTURE
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 FRAMES_AT_ONCE = 2
 Progress = Callable[[int, int], None]
+ItemT = TypeVar('ItemT')
 _log = logging.getLogger(__name__)
 
 
@@ -63,7 +68,8 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
         images, as "adversarial-lcd build" writes it: its graphs are taken as they are, those on
         graph_clean where there are any.
     config : BuilderConfig
-        How graphs are built; graphs of a bag stay what they are.
+        How graphs are built; graphs of a bag stay what they are. A sequence of detections alone
+        takes the detector 'csv', and reads its own unless others are named.
     cache : Path, optional
         Folder of graphs that were built before; by default one in the user's cache. Delete it
         whenever you like.
@@ -74,6 +80,8 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
     ------
     SequenceError
         The source is missing or damaged, or the part holds no frame.
+    ConfigError
+        The detector needs pictures, or a file that is not named.
     ModelError
         The vocabulary or the object model is missing.
     EvaluationError
@@ -84,6 +92,7 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
     if is_bag(part.path) and _holds_graphs(part.path):
         return _recorded_graphs(part)
     sequence = open_sequence(part.path)
+    config = for_sequence(config, sequence)
     numbers = part.numbers(sequence.frame_count)
     folder = cache_folder() / 'graphs' if cache is None else cache
     path = folder / f'{cache_key(sequence, numbers, config)}.npz'
@@ -111,17 +120,67 @@ def build_graphs(sequence: Sequence, config: BuilderConfig, numbers: range | Non
 
     """
     numbers = range(sequence.frame_count) if numbers is None else numbers
-    under_way: deque[Building] = deque()
-    done = 0
-    with GraphBuilder(config, FRAMES_AT_ONCE) as builder:
-        for number, frame in zip(numbers, sequence.frames(numbers.start, numbers.stop),
-                                 strict=True):
-            under_way.append(builder.begin(frame.image(), frame.stamp_ns, sequence=number))
-            while len(under_way) >= FRAMES_AT_ONCE or (under_way and number == numbers[-1]):
-                yield under_way.popleft().graph()
-                done += 1
-                if progress:
-                    progress(done, len(numbers))
+    with GraphBuilder(for_sequence(config, sequence), FRAMES_AT_ONCE) as builder:
+        begun = _begun(builder, sequence, numbers)
+        for done, graph in enumerate(_held_back(begun, FRAMES_AT_ONCE - 1), 1):
+            yield graph()
+            if progress:
+                progress(done, len(numbers))
+
+
+def _begun(builder: GraphBuilder, sequence: Sequence,
+           numbers: range) -> Iterator[Callable[[], MultiTierGraph]]:
+    for number, frame in zip(numbers, sequence.frames(numbers.start, numbers.stop), strict=True):
+        if frame.encoding == NO_PICTURE:
+            yield partial(builder.build_objects, frame.stamp_ns, frame.width, frame.height,
+                          sequence=number)
+        else:
+            yield builder.begin(frame.image(), frame.stamp_ns, sequence=number).graph
+
+
+def _held_back(items: Iterable[ItemT], count: int) -> Iterator[ItemT]:
+    """Yield an item only when so many after it have been taken, too."""
+    waiting: deque[ItemT] = deque()
+    for item in items:
+        waiting.append(item)
+        if len(waiting) > count:
+            yield waiting.popleft()
+    yield from waiting
+
+
+def for_sequence(config: BuilderConfig, sequence: Sequence) -> BuilderConfig:
+    """
+    Return the settings with the detections of the sequence, where these are asked for.
+
+    Raises
+    ------
+    ConfigError
+        The frames have no pictures, but a network is to look at them.
+    SequenceError
+        No frame has detections: they are those of another sequence.
+
+    """
+    if sequence.detections and config.detector != 'csv':
+        raise ConfigError(f'{sequence.source} has no pictures, only {sequence.detections.name}: '
+                          f'expected the detector "csv", found "{config.detector}"')
+    if config.detector != 'csv':
+        return config
+    if not config.detections and sequence.detections:
+        return replace(config, detections=str(sequence.detections))
+    if config.detections:
+        _check_detections(config, sequence)
+    return config
+
+
+def _check_detections(config: BuilderConfig, sequence: Sequence) -> None:
+    table = read_detections(Path(config.detections))
+    tolerance_ns = round(config.detections_tolerance_s * 1e9)
+    near = [table.rows_near(stamp, tolerance_ns) for stamp in sequence.stamps_ns.tolist()]
+    if not any(rows.stop > rows.start for rows in near):
+        raise SequenceError(
+            f'{config.detections} has no detection within {config.detections_tolerance_s:g} s of '
+            f'any of the {sequence.frame_count} frames of {sequence.source}: is it that of '
+            'another sequence?')
 
 
 def _cached(path: Path) -> list[MultiTierGraph] | None:

@@ -1,4 +1,4 @@
-"""Sequences that are folders: TUM RGB-D, 7-Scenes, images in order, repeated walks."""
+"""Folders as sequences: TUM RGB-D, 7-Scenes, images in order, walks, detections alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.frame import Frame, open_compressed
+from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
+from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame, open_compressed
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.trajectory import (
     PLACE_INDEX,
@@ -63,6 +64,31 @@ def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
         ground_truth = folder / TUM_TRUTH
     trajectory = None if ground_truth is None else read_trajectory(ground_truth)
     return _sequence(folder, paths, stamps, trajectory)
+
+
+def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
+    """
+    Open a folder that has detections.csv instead of pictures.
+
+    Its frames are those with detections; a frame in which nothing was found is not known to it.
+    The size of the images is that of a picture in rgb/. Ground truth as in TUM's layout.
+    """
+    stamps = read_detections(folder / DETECTIONS_FILE).frame_stamps_ns
+    samples = images_in(folder / 'rgb') if (folder / 'rgb').is_dir() else []
+    if not samples:
+        raise SequenceError(f'{folder} has {DETECTIONS_FILE}, but neither {TUM_IMAGES} nor a '
+                            'picture in rgb/: put at least one there, to tell the image size')
+    sample = _open(samples[0], 0, None)
+    if ground_truth is None and (folder / TUM_TRUTH).exists():
+        ground_truth = folder / TUM_TRUTH
+    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
+
+    def read(wanted: range) -> Iterator[Frame]:
+        for number in wanted:
+            yield Frame(int(stamps[number]), b'', NO_PICTURE, sample.width, sample.height)
+
+    return Sequence(folder.resolve().name, folder, stamps, (sample.width, sample.height),
+                    trajectory, read, folder / DETECTIONS_FILE)
 
 
 def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None) -> Sequence:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.errors import SequenceError
 
 JPEG, PNG = 'jpeg', 'png'
+NO_PICTURE = 'none'
 RAW_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
 JPEG_QUALITY = 95
 _WRITE_OPTIONS = {JPEG: [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY], PNG: []}
@@ -31,7 +32,8 @@ class Frame:
     data : bytes
         A JPEG or PNG file, or rows of pixels without padding.
     encoding : str
-        'jpeg', 'png', 'bgr8', 'rgb8' or 'mono8'.
+        'jpeg', 'png', 'bgr8', 'rgb8' or 'mono8'; 'none' where nobody kept the picture: there
+        are no data.
     width, height : int
         Pixels.
 
@@ -50,9 +52,13 @@ class Frame:
         Raises
         ------
         SequenceError
-            The data are truncated or no such image, or one of another size.
+            The data are truncated or no such image, or one of another size, or there is none.
 
         """
+        if self.encoding == NO_PICTURE:
+            raise SequenceError(
+                f'frame at {self.stamp_ns} ns has no picture, only recorded detections: build '
+                'graphs of them with "adversarial-lcd build" and the detector "csv"')
         pixels = (self._raw_pixels() if self.encoding in RAW_CHANNELS
                   else decode(self.data, f'frame at {self.stamp_ns} ns'))
         if pixels.shape[:2] != (self.height, self.width):

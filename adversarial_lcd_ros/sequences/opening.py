@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from pathlib import Path
 
@@ -9,11 +10,12 @@ from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import folders
 from adversarial_lcd_ros.sequences.bagfile import is_bag
 from adversarial_lcd_ros.sequences.bags import NO_TRUTH, bag_sequence
+from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE
 from adversarial_lcd_ros.sequences.sequence import Sequence
 
 _LAYOUTS = ('a TUM RGB-D folder (rgb.txt), a folder of JPEG or PNG images, a folder of walks '
-            '(subfolders of images), a 7-Scenes sequence (frame-000000.color.png), a ROS 1 bag '
-            '(.bag) or a rosbag2 (folder, .mcap, .db3)')
+            '(subfolders of images), a 7-Scenes sequence (frame-000000.color.png), a folder of '
+            'detections (detections.csv), a ROS 1 bag (.bag) or a rosbag2 (folder, .mcap, .db3)')
 
 
 def open_sequence(path: Path | str, *, topic: str | None = None,
@@ -26,6 +28,7 @@ def open_sequence(path: Path | str, *, topic: str | None = None,
     ----------
     path : Path or str
         TUM RGB-D folder, folder of images, folder of walks along one path, 7-Scenes sequence,
+        folder of detections (detections.csv in place of rgb.txt; its frames have no pictures),
         ROS 1 bag or rosbag2.
     topic : str, optional
         Bags: the topic of the frames, where several hold camera images.
@@ -72,6 +75,9 @@ def _image_folder(path: Path, ground_truth: Path | str | None,
     if folders.images_in(path):
         poses = beside if ground_truth is None and beside.is_file() else _file(ground_truth)
         return folders.image_folder(path, poses, rate_hz)
+    if (path / DETECTIONS_FILE).is_file():
+        _refuse(path, rate_hz=rate_hz)
+        return _without_truth(folders.detections_folder(path, _file(ground_truth)), ground_truth)
     if beside.is_file():
         raise SequenceError(
             f'{path} has a {folders.TUM_TRUTH} but no {folders.TUM_IMAGES}, which lists the '
@@ -90,8 +96,7 @@ def _file(ground_truth: Path | str | None) -> Path | None:
 def _without_truth(sequence: Sequence, ground_truth: Path | str | None) -> Sequence:
     if ground_truth != NO_TRUTH:
         return sequence
-    return Sequence(sequence.name, sequence.source, sequence.stamps_ns, sequence.image_size,
-                    None, sequence.read)
+    return replace(sequence, trajectory=None)
 
 
 def _refuse(path: Path, **options: object) -> None:

@@ -32,6 +32,8 @@ class Sequence:
         Ground truth; None where the source has none.
     read : callable
         Returns an iterator of the frames of these numbers; use ``frames``.
+    detections : Path or None
+        Where the frames have no pictures: the file of what was detected in them.
 
     Raises
     ------
@@ -46,6 +48,7 @@ class Sequence:
     image_size: tuple[int, int]
     trajectory: Trajectory | None
     read: Callable[[range], Iterator[Frame]]
+    detections: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the frames, and that the ground truth is theirs."""

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, OBJECT_TIER, MultiTierGraph
 from adversarial_lcd_ros.paths import model_path, object_model_path
+from adversarial_lcd_ros.sequences.detections import DetectionTable, read_detections
+from adversarial_lcd_ros.vision.detections import class_words, given_objects, recorded_objects
 from adversarial_lcd_ros.vision.features import FeatureExtractor, Features, spread, to_grey
 from adversarial_lcd_ros.vision.objects import (
     Detections,
@@ -58,13 +61,21 @@ class GraphBuilder:
     Builds the graph of a view: objects are anchors, features hang on them and on each other.
 
     The network runs beside the feature extraction, in threads of its own. Same image, same
-    settings, same bytes. Close it, or use it as a context manager.
+    settings, same bytes. Objects may also come from somebody else's detector: from a file, or
+    with each frame. Close it, or use it as a context manager.
 
     Parameters
     ----------
     config : BuilderConfig
     frames_at_once : int
         Frames whose objects are looked for side by side.
+
+    Raises
+    ------
+    ModelError
+        The vocabulary or the object model is missing or damaged.
+    ConfigError, SequenceError
+        The file of detections is not named, or cannot be read.
 
     """
 
@@ -78,6 +89,7 @@ class GraphBuilder:
         if self.config.detector == 'onnx':
             model = Path(self.config.model) if self.config.model else object_model_path()
             self._objects = ObjectDetector(model, self.config.object_score, self.config.threads)
+        self._table = _recorded(self.config) if self.config.detector == 'csv' else None
         self._threads = ThreadPoolExecutor(frames_at_once, 'objects')
 
     def build(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
@@ -102,26 +114,72 @@ class GraphBuilder:
         return self.begin(image, stamp_ns, frame_id, sequence).graph()
 
     def begin(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
-              sequence: int = 0) -> Building:
-        """Begin to build the graph of an image; see ``build``. Returns with its features."""
+              sequence: int = 0, objects: Future[Detections] | None = None) -> Building:
+        """
+        Begin to build the graph of an image; see ``build``. Returns with its features.
+
+        Parameters
+        ----------
+        image, stamp_ns, frame_id, sequence
+            See ``build``.
+        objects : Future of Detections, optional
+            Under the detector 'topic', and only there: what somebody else finds in the image.
+
+        """
         grey = to_grey(image)
-        coming = self._threads.submit(self._detect, image)
+        coming = (self._threads.submit(self._detect, image, stamp_ns) if objects is None
+                  else objects)
         height, width = grey.shape
         features = self._features.extract(grey)
         words = self._vocabulary.words(features.descriptor)
         kept = spread(features, self.config.features, width, height)
         return Building(coming, lambda objects: assemble(
-            features[kept], words[kept], objects, self._vocabulary.vector(words),
-            self.config.feature_neighbours, width=width, height=height, stamp_ns=stamp_ns,
-            frame_id=frame_id, sequence=sequence))
+            features[kept], words[kept], self._anchors(objects, width, height),
+            self._vocabulary.vector(words), self.config.feature_neighbours, width=width,
+            height=height, stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence))
 
-    def _detect(self, image: NDArray[np.uint8]) -> Detections:
+    def build_objects(self, stamp_ns: int, width: int, height: int, frame_id: str = 'camera',
+                      sequence: int = 0) -> MultiTierGraph:
+        """
+        Return the graph of a frame of which only the recorded detections are there.
+
+        It has the object tier alone, or no node where nothing was found. For want of visual
+        words its vBoW vector is that of the classes of its objects; see ``class_words``.
+
+        Raises
+        ------
+        ConfigError
+            The detector is not 'csv'.
+
+        """
+        if self._table is None:
+            raise ConfigError(f'detector {self.config.detector!r} for a frame without a picture: '
+                              'expected "csv", which reads its recorded detections')
+        objects = self._anchors(self._detected(stamp_ns), width, height)
+        return assemble(Features.none(), np.zeros(0, np.uint32), objects,
+                        class_words(objects.label), 0, width=width, height=height,
+                        stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence)
+
+    def _detect(self, image: NDArray[np.uint8], stamp_ns: int) -> Detections:
+        if self.config.detector == 'topic':
+            raise ConfigError('detector "topic" without detections: only the node graph_builder '
+                              'has the topic; set "detector" to "csv" to read them from a file')
         if self._objects is None:
-            return Detections.none()
+            return self._detected(stamp_ns)
         if image.ndim == 2:
             image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
-        return filter_objects(self._objects.detect(image), image.shape[1], image.shape[0],
-                              self.config)
+        return self._objects.detect(image)
+
+    def _detected(self, stamp_ns: int) -> Detections:
+        if self._table is None:
+            return Detections.none()
+        return recorded_objects(self._table, stamp_ns,
+                                round(self.config.detections_tolerance_s * 1e9))
+
+    def _anchors(self, found: Detections, width: int, height: int) -> Detections:
+        if self._objects is None:
+            found = given_objects(found, width, height, self.config.object_score)
+        return filter_objects(found, width, height, self.config)
 
     def close(self) -> None:
         """Stop the threads of the network."""
@@ -134,6 +192,12 @@ class GraphBuilder:
     def __exit__(self, *_: object) -> None:
         """Close the builder."""
         self.close()
+
+
+def _recorded(config: BuilderConfig) -> DetectionTable:
+    if not config.detections:
+        raise ConfigError('detector "csv" without a file: name it by the setting "detections"')
+    return read_detections(Path(config.detections))
 
 
 def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
