@@ -15,21 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image
-from std_msgs.msg import Header
+from std_msgs.msg import Header, UInt8MultiArray
 
-from adversarial_lcd_ros.codec import encode_graph
+from adversarial_lcd_ros.codec import decode_detections, encode_graph
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
+from adversarial_lcd_ros.nodes.endpoints import (
+    MirroredSubscription,
+    create_payload_publisher,
+    steady_timer,
+)
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
-from adversarial_lcd_ros.payload import wrap
+from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
+from adversarial_lcd_ros.vision.detections import MISSED, DetectionInbox
 from adversarial_lcd_ros.vision.draw import draw_graph
+from adversarial_lcd_ros.vision.objects import Detections
 
-IMAGE, COMPRESSED = 'image', 'image/compressed'
+IMAGE, COMPRESSED, DETECTIONS = 'image', 'image/compressed', 'detections'
 _REMEMBERED_STAMPS = 64
+_LOOK_PERIOD_S = 0.01
+_WARNING_PERIOD_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,9 @@ class GraphBuilderNode(PipelineNode):
     manual = Manual(
         'camera frames to multi-tier graphs of objects and visual features',
         subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',
-                    f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG or PNG)'),
+                    f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG or PNG)',
+                    f'{DETECTIONS} (std_msgs/UInt8MultiArray, Detections): the objects of each '
+                    'frame, under detector:=topic'),
         publishes=('graph (std_msgs/UInt8MultiArray, MultiTierGraph): one for each frame',
                    'overlay (sensor_msgs/Image): the graph over the frame, if anyone listens',
                    '/diagnostics (diagnostic_msgs/DiagnosticArray): counts, rates, latency'))
@@ -73,6 +83,37 @@ class GraphBuilderNode(PipelineNode):
         self._stamps: dict[str, deque[int]] = {
             topic: deque(maxlen=_REMEMBERED_STAMPS) for topic in self._inputs}
         self._last_number: dict[str, int] = {}
+        self._inbox = (self._open_inbox(config, node_config) if config.detector == 'topic'
+                       else None)
+
+    def _open_inbox(self, config: Any, node_config: Any) -> DetectionInbox:
+        """Take the objects of frames from a topic; these frames wait for them."""
+        inbox = DetectionInbox(
+            round(config.detections_tolerance_s * 1e9), node_config.detections_wait_ms / 1e3,
+            node_config.queue_depth, self._count_detections)
+        self._detections = MirroredSubscription(self, UInt8MultiArray, DETECTIONS,
+                                                self._on_detections, raw=True)
+        self._expiry = steady_timer(self, _LOOK_PERIOD_S,
+                                    lambda: inbox.expire(time.perf_counter()))
+        return inbox
+
+    def _on_detections(self, wire: bytes) -> None:
+        self.diagnostics.count('received detections')
+        try:
+            found = decode_detections(unwrap(wire))
+        except AdversarialLcdError as error:
+            self.diagnostics.refuse('detections', error)
+            return
+        if self._inbox:
+            self._inbox.offer(found.stamp_ns, Detections(found.label, found.box, found.score))
+
+    def _count_detections(self, what: str) -> None:
+        self.diagnostics.count(what)
+        remedy = ('their graphs have no objects; set detections_wait_ms or '
+                  'detections_tolerance_s' if what == MISSED
+                  else 'late, or of frames that never came')
+        self.get_logger().warning(f'{what}: {self.diagnostics[what]} so far ({remedy})',
+                                  throttle_duration_sec=_WARNING_PERIOD_S)
 
     def _on_frame(self, topic: str, pixels: Callable[[Any], NDArray[np.uint8]], message: Any,
                   info: Mapping[str, Any]) -> None:
@@ -86,13 +127,16 @@ class GraphBuilderNode(PipelineNode):
         sequence, self._sequence = self._sequence, self._sequence + 1
         try:
             image = pixels(message)
-            building = self._builder.begin(image, stamp_ns, message.header.frame_id, sequence)
+            frame = (image, stamp_ns, message.header.frame_id, sequence)
+            building = (self._builder.begin(*frame) if self._inbox is None else
+                        self._builder.begin(*frame, self._inbox.expect(stamp_ns, arrival_s)))
         except AdversarialLcdError as error:
             self.diagnostics.refuse('frame', error)
             return
         self._under_way.append(_Frame(building, message.header, image, arrival_s))
         building.when_ready(self._ready.trigger)
-        while len(self._under_way) > self._frames_at_once:
+        # Frames that wait for a message must not be waited for: it comes in this thread.
+        while self._inbox is None and len(self._under_way) > self._frames_at_once:
             self._publish(self._under_way.popleft())
 
     def _publish_ready(self) -> None:
@@ -138,6 +182,8 @@ class GraphBuilderNode(PipelineNode):
 
     def close(self) -> None:
         """Publish what is under way, and stop the threads of the network."""
+        if self._inbox:
+            self._inbox.close()
         while self._under_way:
             self._publish(self._under_way.popleft())
         self._builder.close()
