@@ -16,7 +16,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
+from adversarial_lcd_ros.lcd.targets import TARGETS, make_target, prepare
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),
@@ -157,6 +157,52 @@ def test_reuse_between_queries_does_not_change_the_answer(model):
     detector.judge(at(9))
     flipped = at(9).flip([(0, 9), (4, 20), (30, 31)])
     assert detector.judge(flipped) == fresh.judge(flipped)
+
+
+def map_of(model, target):
+    """Return a function that makes detectors with the same keyframes: some alike, some not."""
+    graph = make_graph(30, [(k % 4, k) for k in range(5, 30)] + [(k, k + 2) for k in range(28)],
+                       objects=4, seed=5)
+    stored = [replace(graph.flip(flips_of(graph, np.random.default_rng(second), 12)),
+                      stamp_ns=second * 10**9, sequence=second) for second in range(3)]
+    stored += [at(second, seed=second) for second in (3, 4)]
+
+    def make():
+        detector = LoopClosureDetector(
+            LcdConfig(target=target, model=model(target), min_gap_s=1.0))
+        for keyframe in stored:
+            detector.detect(keyframe)
+        return detector
+    return replace(graph, stamp_ns=20 * 10**9), make
+
+
+@pytest.mark.parametrize('target', list(TARGETS))
+def test_what_was_judged_before_changes_no_bit_of_a_probability(model, target):
+    graph, make = map_of(model, target)
+    used = make()
+
+    # The first call compiles.
+    @settings(max_examples=12, deadline=None)
+    @given(st.lists(st.tuples(st.integers(0, 2**16), st.integers(0, 40), st.booleans()),
+                    min_size=2, max_size=4))
+    def judge_in_turn(steps):
+        used.judge(replace(graph, stamp_ns=30 * 10**9))  # the next one is a new base
+        for seed, flips, stretched in steps:
+            asked = graph.flip(flips_of(graph, np.random.default_rng(seed), flips))
+            if stretched:
+                asked = replace(asked, edge_length=asked.edge_length * np.float32(1.5))
+            assert used.judge(asked) == make().judge(asked)
+
+    judge_in_turn()
+
+
+def test_a_flip_at_an_object_changes_the_score_of_objects():
+    view = View(GRAPH)
+    nodes = Comparison(view, [View(GRAPH), View(make_graph(40, seed=3))])
+    scores = prepare(make_target('wl'), view, nodes)
+    flipped = View(GRAPH.flip([(0, 12), (0, 5), (2, 3)]), view)
+    assert (scores(flipped) != scores(view)).any(axis=0).tolist() == [True, True, True]
+    assert scores(flipped).tolist() == make_target('wl').compare(flipped, nodes).tolist()
 
 
 def test_hard_answers_tell_the_decision_only(model):

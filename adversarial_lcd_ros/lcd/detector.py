@@ -14,7 +14,7 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
-from adversarial_lcd_ros.lcd.targets import make_target
+from adversarial_lcd_ros.lcd.targets import Scores, make_target, prepare
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
 
@@ -23,14 +23,32 @@ CACHED_VIEWS = 256
 
 @dataclass
 class _QueryNodes:
-    """What judging a graph leaves to reuse for its perturbations: nodes, candidates, matches."""
+    """
+    What judging a graph leaves to reuse for its perturbations.
+
+    Attributes
+    ----------
+    key : tuple
+        What all of it was made of, the base's edges apart.
+    base : View
+        The first graph judged. Later ones are the cheaper the fewer edges they have changed,
+        and are judged the same whichever came first.
+    bow : float64, (keyframes,)
+    candidates : list of int
+        Keyframes, r' of them.
+    average : float64, (r', r)
+        Weight of each reference in the window of each candidate.
+    scores : callable or None
+        Scores of a View with every reference; None without a candidate.
+
+    """
 
     key: tuple[object, ...]
-    x0: NDArray[np.float32]
+    base: View
     bow: NDArray[np.float64]
     candidates: list[int]
-    windows: list[NDArray[np.int64]]
-    comparison: Comparison
+    average: NDArray[np.float64]
+    scores: Scores | None
 
 
 class LoopClosureDetector:
@@ -75,11 +93,10 @@ class LoopClosureDetector:
     def judge(self, graph: MultiTierGraph) -> LoopClosure:
         """Decide whether a graph closes a loop with a keyframe; remembers nothing."""
         nodes = self._query_nodes(graph)
-        if not nodes.candidates:
+        if nodes.scores is None:
             return LoopClosure(graph.stamp_ns, graph.frame_id, graph.sequence,
                                is_loop=False, probability=0.0)
-        scores = self._target.compare(View(graph, nodes.x0), nodes.comparison)
-        logit = self._decision.logit([scores[rows].mean(axis=0) for rows in nodes.windows])
+        logit = self._decision.logit(nodes.average @ nodes.scores(View(graph, nodes.base)))
         best = int(logit.argmax())
         keyframe = nodes.candidates[best]
         chance = probability(float(logit[best]))
@@ -101,14 +118,15 @@ class LoopClosureDetector:
         old = self._database.admissible(graph.stamp_ns, round(self.config.min_gap_s * 1e9))
         bow = self._database.scores(graph)
         candidates = self._retrieve(bow, old)
+        query = View(graph)
+        if not candidates:
+            return _QueryNodes(key, query, bow, [], np.zeros((0, 0)), None)
         around = [self._window(candidate, old) for candidate in candidates]
         keyframes = sorted({keyframe for window in around for keyframe in window})
-        rows = {keyframe: row for row, keyframe in enumerate(keyframes)}
-        query = View(graph)
-        return _QueryNodes(key, query.x0, bow, candidates,
-                           [np.array([rows[keyframe] for keyframe in window])
-                            for window in around],
-                           Comparison(query, [self._view(keyframe) for keyframe in keyframes]))
+        comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
+        average = np.array([np.isin(keyframes, window) / len(window) for window in around])
+        return _QueryNodes(key, query, bow, candidates, average,
+                           prepare(self._target, query, comparison))
 
     def _retrieve(self, bow: NDArray[np.float64], old: NDArray[np.bool_]) -> list[int]:
         """Return keyframes by falling vBoW score, none in another's map window."""

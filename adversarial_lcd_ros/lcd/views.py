@@ -6,42 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
 from adversarial_lcd_ros.hamming import lanes, mutual
+from adversarial_lcd_ros.lcd import kernels
+from adversarial_lcd_ros.lcd.kernels import MIN_COSINE
 
-MIN_COSINE = 0.4
-NEIGHBOUR_WEIGHT = 0.5
-LENGTH_SCALE = 0.1
 _BITS = 8 * DESCRIPTOR_BYTES
 # The largest distance whose cosine, 1 - 2 distance / bits, is above MIN_COSINE.
 _FARTHEST = math.ceil((1 - MIN_COSINE) * _BITS / 2) - 1
-
-
-def unpack_descriptors(descriptor: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """
-    Return ORB descriptors as unit vectors of +-1/16.
-
-    Their dot product is the cosine 1 - 2 hamming / 256.
-
-    Parameters
-    ----------
-    descriptor : uint8, (k, 32)
-
-    Returns
-    -------
-    float32, (k, 256)
-
-    """
-    bits = np.unpackbits(descriptor, axis=1).astype(np.float32)
-    bits -= np.float32(0.5)
-    bits *= np.float32(0.125)
-    return bits
 
 
 class View:
@@ -56,18 +32,19 @@ class View:
 
     """
 
-    def __init__(self, graph: MultiTierGraph, x0: NDArray[np.float32] | None = None) -> None:
+    def __init__(self, graph: MultiTierGraph, same_nodes: View | None = None) -> None:
         self.graph = graph
-        self.objects = graph.object_count
-        self.features = graph.node_count - graph.object_count
-        if x0 is not None:
-            self.x0 = x0
+        self.objects: int = same_nodes.objects if same_nodes else graph.object_count
+        self.features = graph.node_count - self.objects
+        if same_nodes:
+            self.x0 = same_nodes.x0
 
     @cached_property
-    def x0(self) -> NDArray[np.float32]:
-        """Initial node features: unit descriptors, zero for objects, shape (n, 256)."""
-        rows = np.zeros((self.graph.node_count, 256), np.float32)
-        rows[self.objects:] = unpack_descriptors(self.graph.descriptor[self.objects:])
+    def x0(self) -> NDArray[np.int8]:
+        """Initial node features: descriptor bits as +-1, zero for objects, shape (n, 256)."""
+        rows = np.zeros((self.graph.node_count, _BITS), np.int8)
+        bits = np.unpackbits(self.graph.descriptor[self.objects:], axis=1)
+        rows[self.objects:] = 2 * bits.astype(np.int8) - 1
         return rows
 
     @cached_property
@@ -76,20 +53,21 @@ class View:
         return lanes(self.graph.descriptor[self.objects:])
 
     @cached_property
-    def neighbour_mean(self) -> NDArray[np.float32]:
-        """Mean of x0 over the neighbours, weighted by exp(-length / 0.1), shape (n, 256)."""
-        weight = self.graph.weighted_adjacency(LENGTH_SCALE).astype(np.float32)
-        total = np.maximum(weight.sum(axis=1), np.float32(1e-12))
-        mean: NDArray[np.float32] = sparse.diags_array(1 / total) @ weight @ self.x0
-        return mean
+    def incidence(self) -> kernels.Incidence:
+        """Neighbours and edge weights of every node; see ``kernels.incidence``."""
+        found: kernels.Incidence = kernels.incidence(
+            self.graph.edge, self.graph.edge_length, self.graph.node_count)
+        return found
+
+    def iterated(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return features of some nodes after one continuous WL iteration, unit rows (k, 256)."""
+        rows: NDArray[np.float64] = kernels.iterated_rows(nodes, self.x0, *self.incidence)
+        return rows
 
     @cached_property
     def x1(self) -> NDArray[np.float32]:
-        """Node features after one continuous WL iteration, unit rows, shape (n, 256)."""
-        mixed = self.x0 + np.float32(NEIGHBOUR_WEIGHT) * self.neighbour_mean
-        norm = np.sqrt(np.einsum('ij,ij->i', mixed, mixed))
-        rows: NDArray[np.float32] = mixed / np.maximum(norm, np.float32(1e-12))[:, None]
-        return rows
+        """Those of all nodes, rounded: many references are kept at once; shape (n, 256)."""
+        return self.iterated(np.arange(self.graph.node_count)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -124,7 +102,8 @@ class Comparison:
     A query's nodes beside several references: all that edge flips of the query leave alone.
 
     An attack asks about the same nodes hundreds of times. What is kept here is laid out for
-    that: one flat array over all references, ``*_owner`` telling whose a row is.
+    that: flat arrays over all references, ``*_owner`` telling whose a row is. Matches are in the
+    order of the query's nodes, credits in that of the query's edges.
 
     Attributes
     ----------
@@ -142,37 +121,45 @@ class Comparison:
         self.objects = np.array([view.objects for view in references], np.int64)
         self.edges = np.array([view.graph.edge_count for view in references], np.int64)
         self._query_nodes = query.graph.node_count
+        self._query_labels = query.graph.label[:query.objects]
+        nodes = np.concatenate([match.query for match in self.matches])
+        self._order = np.argsort(nodes, kind='stable')
+        self.match_query = nodes[self._order]
 
     def __len__(self) -> int:
         """Return the number of references, r."""
         return len(self.references)
 
-    def total(self, owner: NDArray[np.int64], value: NDArray[np.floating[Any]]
+    def total(self, owner: NDArray[np.int64], value: NDArray[np.float64]
               ) -> NDArray[np.float64]:
         """Return the sum of the values of each reference, shape (r,)."""
-        sums: NDArray[Any] = np.bincount(owner, value, minlength=len(self))
-        return sums.astype(np.float64)
+        sums: NDArray[np.float64] = kernels.total_by_owner(owner, value, len(self))
+        return sums
+
+    @cached_property
+    def match_start(self) -> NDArray[np.int64]:
+        """Where the matches of each query node begin, shape (n + 1,)."""
+        return np.searchsorted(self.match_query, np.arange(self._query_nodes + 1))
 
     @cached_property
     def match_owner(self) -> NDArray[np.int64]:
         """Reference of each matched feature, shape (k,)."""
-        return np.repeat(np.arange(len(self)), [len(match.query) for match in self.matches])
+        lengths = [len(match.query) for match in self.matches]
+        return np.repeat(np.arange(len(self)), lengths)[self._order]
 
     @cached_property
-    def match_query(self) -> NDArray[np.int64]:
-        """Query node of each matched feature, shape (k,)."""
-        return np.concatenate([match.query for match in self.matches])
-
-    @cached_property
-    def match_weight(self) -> NDArray[np.float32]:
+    def match_weight(self) -> NDArray[np.float64]:
         """Weight of each matched feature, shape (k,)."""
-        return np.concatenate([match.weight for match in self.matches])
+        weights = np.concatenate([match.weight for match in self.matches])
+        return weights[self._order].astype(np.float64)
 
     @cached_property
     def match_x1(self) -> NDArray[np.float32]:
         """Reference's features after one WL iteration, of each matched feature, (k, 256)."""
-        return np.concatenate([view.x1[match.reference] for view, match
-                               in zip(self.references, self.matches, strict=True)])
+        rows = np.empty((len(self.match_query), _BITS), np.float32)
+        for owner, (view, match) in enumerate(zip(self.references, self.matches, strict=True)):
+            rows[self.match_owner == owner] = view.x1[match.reference]
+        return rows
 
     @cached_property
     def object_x1(self) -> NDArray[np.float32]:
@@ -180,7 +167,42 @@ class Comparison:
         return np.concatenate([view.x1[:view.objects] for view in self.references])
 
     @cached_property
-    def _credit(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    def object_owner(self) -> NDArray[np.int64]:
+        """Reference of each object, shape (sum of objects,)."""
+        return np.repeat(np.arange(len(self)), self.objects)
+
+    @cached_property
+    def _object_columns(self) -> list[slice]:
+        ends = np.cumsum(self.objects).tolist()
+        return [slice(end - count, end) for end, count
+                in zip(ends, self.objects.tolist(), strict=True)]
+
+    def objects_of(self, place: int) -> slice:
+        """Return which rows of ``object_x1`` are a reference's."""
+        return self._object_columns[place]
+
+    @cached_property
+    def same_class(self) -> NDArray[np.bool_]:
+        """Whether an object of the query has a reference's class, (objects, sum of objects)."""
+        labels = [view.graph.label[:view.objects] for view in self.references]
+        same: NDArray[np.bool_] = self._query_labels[:, None] == np.concatenate(labels)
+        return same
+
+    @cached_property
+    def credit(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+        """
+        Query pairs whose matches a reference joins: what the query earns by having that edge.
+
+        Returns
+        -------
+        key : int64, (c,)
+            Pairs as source * n + target, ascending.
+        weight : float64, (c,)
+            w_u w_v.
+        owner : int64, (c,)
+            Reference of each.
+
+        """
         keys, weights, owners = [], [], []
         for owner, (view, match) in enumerate(zip(self.references, self.matches, strict=True)):
             node = np.full(view.graph.node_count, -1, np.int64)
@@ -191,19 +213,6 @@ class Comparison:
             keys.append((np.minimum(u, v) * self._query_nodes + np.maximum(u, v))[both])
             weights.append((weight[view.graph.edge[:, 0]] * weight[view.graph.edge[:, 1]])[both])
             owners.append(np.full(len(keys[-1]), owner))
-        return np.concatenate(keys), np.concatenate(weights), np.concatenate(owners)
-
-    @property
-    def credit_key(self) -> NDArray[np.int64]:
-        """Query pairs, as source * n + target, whose matches a reference joins, (c,)."""
-        return self._credit[0]
-
-    @property
-    def credit_weight(self) -> NDArray[np.float64]:
-        """w_u w_v of each such pair: what the query earns by having that edge, (c,)."""
-        return self._credit[1]
-
-    @property
-    def credit_owner(self) -> NDArray[np.int64]:
-        """Reference of each such pair, shape (c,)."""
-        return self._credit[2]
+        order = np.argsort(np.concatenate(keys), kind='stable')
+        return (np.concatenate(keys)[order], np.concatenate(weights)[order],
+                np.concatenate(owners)[order])

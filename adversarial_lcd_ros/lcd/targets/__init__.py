@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.targets.anchored import AnchoredTarget
-from adversarial_lcd_ros.lcd.targets.base import Target
+from adversarial_lcd_ros.lcd.targets.base import Scores, Target, prepare
 from adversarial_lcd_ros.lcd.targets.descriptors import DescriptorsTarget
 from adversarial_lcd_ros.lcd.targets.edges import EdgesTarget
 from adversarial_lcd_ros.lcd.targets.vbow import VbowTarget
@@ -15,7 +15,7 @@ TARGETS: dict[str, type[Target]] = {
     for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget)
 }
 
-__all__ = ['TARGETS', 'Target', 'make_target']
+__all__ = ['TARGETS', 'Scores', 'Target', 'make_target', 'prepare']
 
 
 def make_target(name: str) -> Target:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from collections.abc import Callable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.lcd.views import Comparison, View
+
+# Scores of a View whose nodes are known, shape (r, channels).
+Scores = Callable[[View], NDArray[np.float64]]
 
 
 class Target(Protocol):
@@ -39,3 +43,28 @@ class Target(Protocol):
 
         """
         ...
+
+
+@runtime_checkable
+class IncrementalTarget(Target, Protocol):
+    """A target that can reuse what it computed for a graph that differs in a few edges."""
+
+    def prepare(self, base: View, nodes: Comparison) -> Scores:
+        """
+        Return what scores graphs with the base's nodes exactly as ``compare`` does.
+
+        Parameters
+        ----------
+        base : View
+            The graph that others are expected to be near to.
+        nodes : Comparison
+
+        """
+        ...
+
+
+def prepare(target: Target, base: View, nodes: Comparison) -> Scores:
+    """Return what scores graphs with the nodes of a base; any target will do."""
+    if isinstance(target, IncrementalTarget):
+        return target.prepare(base, nodes)
+    return lambda query: target.compare(query, nodes)

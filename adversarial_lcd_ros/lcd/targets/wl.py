@@ -7,7 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.targets.scores import edge_score, neighbourhood_score, object_score
+from adversarial_lcd_ros.lcd.kernels import changed_nodes
+from adversarial_lcd_ros.lcd.targets.base import Scores
+from adversarial_lcd_ros.lcd.targets.scores import NeighbourhoodScore, ObjectScore, edge_score
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
@@ -19,5 +21,17 @@ class WlTarget:
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 3)."""
-        return np.stack([edge_score(query, nodes), neighbourhood_score(query, nodes),
-                         object_score(query, nodes)], axis=1)
+        return self.prepare(query, nodes)(query)
+
+    def prepare(self, base: View, nodes: Comparison) -> Scores:
+        """Return what scores the base and, sooner, others that differ in a few edges."""
+        features, objects = NeighbourhoodScore(base, nodes), ObjectScore(base, nodes)
+
+        def scores(query: View) -> NDArray[np.float64]:
+            changed = changed_nodes(
+                base.graph.edge_key, base.graph.edge_length,
+                query.graph.edge_key, query.graph.edge_length, query.graph.node_count)
+            rows = query.iterated(changed)
+            return np.stack([edge_score(query, nodes), features.of(query, changed, rows),
+                             objects.of(query, changed, rows)], axis=1)
+        return scores
