@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 import hashlib
 from typing import Any
@@ -102,8 +102,7 @@ class MultiTierGraph:
         self._check_array('word_weight', np.float32, (words,))
         self._check_nodes()
         self._check_edges(count)
-        if words and (np.any(np.diff(self.word.astype(np.int64)) <= 0)
-                      or np.any(self.word_weight < 0)):
+        if words and ((self.word[1:] <= self.word[:-1]).any() or self.word_weight.min() < 0):
             raise GraphError('vBoW words must ascend without repeats and have weights >= 0')
 
     def _check_array(self, name: str, dtype: type, shape: tuple[int, ...]) -> None:
@@ -121,18 +120,17 @@ class MultiTierGraph:
             raise GraphError(f'image size {self.width} x {self.height}: expected positive pixels')
         if np.any(self.tier > FEATURE_TIER):
             raise GraphError(f'tier {int(self.tier.max())}: expected 0 (object) or 1 (feature)')
-        if np.any(np.diff(self.tier.astype(np.int8)) < 0):
+        if (self.tier[1:] < self.tier[:-1]).any():
             raise GraphError('objects (tier 0) must come before features (tier 1)')
 
     def _check_edges(self, count: int) -> None:
         if not len(self.edge):
             return
-        source, target = self.edge[:, 0].astype(np.int64), self.edge[:, 1].astype(np.int64)
-        if target.max() >= count or source.max() >= count:
+        if self.edge.max() >= count:
             raise GraphError(f'edge to node {int(self.edge.max())}: the graph has {count} nodes')
-        if np.any(source >= target):
+        if (self.edge[:, 0] >= self.edge[:, 1]).any():
             raise GraphError('every edge needs source < target (no self-loops)')
-        if np.any(np.diff(source * count + target) <= 0):
+        if (self.edge_key[1:] <= self.edge_key[:-1]).any():
             raise GraphError('edges must be sorted by source, then target, without repeats')
         if self.edge_length.min() < 0:
             raise GraphError(f'edge length {float(self.edge_length.min()):g}: expected >= 0')
@@ -213,12 +211,15 @@ class MultiTierGraph:
 
     def has_edges(self, pairs: ArrayLike) -> NDArray[np.bool_]:
         """Tell for each of the (k, 2) node pairs whether the graph has that edge."""
-        key = self._pair_keys(pairs)
+        return self._find(self._pair_keys(pairs))[1]
+
+    def _find(self, key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return where in ``edge_key`` keys are or would be, and whether they are."""
         place = np.searchsorted(self.edge_key, key)
-        found = np.zeros(len(key), bool)
-        inside = place < self.edge_count
-        found[inside] = self.edge_key[place[inside]] == key[inside]
-        return found
+        if not self.edge_count:
+            return place, np.zeros(len(key), bool)
+        found: NDArray[np.bool_] = self.edge_key[np.minimum(place, self.edge_count - 1)] == key
+        return place, found
 
     def _pair_keys(self, pairs: ArrayLike) -> NDArray[np.int64]:
         ends = np.asarray(pairs, np.int64).reshape(-1, 2)
@@ -248,16 +249,29 @@ class MultiTierGraph:
 
         """
         key = np.sort(self._pair_keys(pairs))
-        if np.any(np.diff(key) == 0):
+        if (key[1:] == key[:-1]).any():
             raise GraphError('a pair is flipped twice: each flip must be another pair')
-        keep = ~np.isin(self.edge_key, key, assume_unique=True)
-        added = key[~np.isin(key, self.edge_key, assume_unique=True)]
+        place, present = self._find(key)
+        keep = np.ones(self.edge_count, bool)
+        keep[place[present]] = False
+        added = key[~present]
         ends = np.stack([added // self.node_count, added % self.node_count], axis=1)
-        merged = np.r_[self.edge_key[keep], added]
+        merged = np.concatenate([self.edge_key[keep], added])
         order = np.argsort(merged, kind='stable')
         edge = np.concatenate([self.edge[keep], ends.astype(np.uint32)])[order]
-        length = np.r_[self.edge_length[keep], self.length_between(ends)][order]
-        return replace(self, edge=edge, edge_length=length)
+        length = np.concatenate([self.edge_length[keep], self.length_between(ends)])[order]
+        return self._with_edges(edge, length, merged[order])
+
+    def _with_edges(self, edge: NDArray[np.uint32], length: NDArray[np.float32],
+                    key: NDArray[np.int64]) -> MultiTierGraph:
+        """Return this graph with other edges; its nodes need no second check, nor digest."""
+        graph = object.__new__(MultiTierGraph)
+        vars(graph).update({name: getattr(self, name) for name in self.__dataclass_fields__},
+                           edge=edge, edge_length=length, edge_key=key,
+                           node_digest=self.node_digest)
+        graph._check_array('edge', np.uint32, edge.shape)
+        graph._check_array('edge_length', np.float32, (len(edge),))
+        return graph
 
     def flips_to(self, other: MultiTierGraph) -> NDArray[np.uint32]:
         """

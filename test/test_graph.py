@@ -27,7 +27,12 @@ def test_flipping_twice_is_no_change(graph, seed, count):
     assert once.flip(pairs) == graph
     assert len(graph.flips_to(once)) == len(pairs)
     assert abs(once.edge_count - graph.edge_count) <= len(pairs)
-    assert once.node_digest == graph.node_digest
+    checked = replace(once)  # by the constructor: nothing is carried over
+    assert checked == once
+    assert checked.node_digest == once.node_digest == graph.node_digest
+    assert checked.edge_key.tolist() == once.edge_key.tolist()
+    assert not once.edge.flags.writeable
+    assert not once.edge_length.flags.writeable
 
 
 @given(graphs())
