@@ -12,6 +12,7 @@ import sys
 
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.commands import (
+    build,
     evaluate,
     fetch_model,
     importing,
@@ -49,8 +50,8 @@ def _parser() -> ArgumentParser:
         description='Measure how easily graph-based loop closure detection is fooled.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
-    for add in (evaluate.add_demo, importing.add, evaluate.add, report.add, train.add,
-                fetch_model.add, inspect.add, params.add):
+    for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
+                train.add, fetch_model.add, inspect.add, params.add):
         add(commands)
     return parser
 

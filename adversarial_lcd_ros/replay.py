@@ -189,6 +189,11 @@ def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
             yield log_ns, _payload(wire)
 
 
+def payload_schemas() -> dict[str, str]:
+    """Return the .msg texts of the payloads by their names, for the metadata of a bag."""
+    return {f'{PACKAGE}/msg/{message}': schema_text(message) for message in MESSAGES}
+
+
 class BagRecorder:
     """
     Writes messages to a rosbag2 (MCAP), from any thread; the bag appears on ``close``.
@@ -205,7 +210,7 @@ class BagRecorder:
     """
 
     def __init__(self, path: Path) -> None:
-        schemas = {f'{PACKAGE}/msg/{message}': schema_text(message) for message in MESSAGES}
+        schemas = payload_schemas()
         writer = BagWriter(Path(path))
         for message, text in schemas.items():
             writer.note(message, text)

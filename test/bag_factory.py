@@ -55,6 +55,20 @@ def tum_folder(path, count=4, suffix='.jpg', truth=True):
     return path
 
 
+def noise(seed=0):
+    """Return a grey picture full of corners."""
+    coarse = np.random.default_rng(seed).integers(0, 256, (24, 32), np.uint8)
+    return cv2.resize(coarse, (160, 120), interpolation=cv2.INTER_CUBIC)
+
+
+def textured_folder(path, count=4):
+    """Write a folder in TUM's layout whose frames have features."""
+    tum_folder(path, count)
+    for number, file in enumerate(sorted((path / 'rgb').iterdir())):
+        file.write_bytes(encoded(noise(number)))
+    return path
+
+
 class Messages:
     """Messages of ROS 1 or ROS 2, made of a typestore."""
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import bag_factory as make
-import cv2
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -42,11 +41,6 @@ def table(path, *lines, header=HEADER):
     return path
 
 
-def noise(seed):
-    coarse = np.random.default_rng(seed).integers(0, 256, (24, 32), np.uint8)
-    return cv2.resize(coarse, (160, 120), interpolation=cv2.INTER_CUBIC)
-
-
 @pytest.fixture
 def config(vocabulary):
     return BuilderConfig(detector='csv', vocabulary=vocabulary, features=20,
@@ -58,7 +52,7 @@ def folder(tmp_path):
     """Detections of four frames, without their pictures but for one."""
     place = tmp_path / 'office'
     (place / 'rgb').mkdir(parents=True)
-    (place / 'rgb' / 'sample.jpg').write_bytes(make.encoded(noise(0)))
+    (place / 'rgb' / 'sample.jpg').write_bytes(make.encoded(make.noise(0)))
     table(place / 'detections.csv',
           *(line(stamp, label, (20 + 40 * k, 20, 30, 25))
             for number, stamp in enumerate(make.stamps())
@@ -137,11 +131,11 @@ def test_recorded_objects_become_anchors(tmp_path, config):
                  line(label=4, box=(60, 60, 2, 2), score=0.9),  # too small
                  line(STAMP_NS + 100 * MS, label=5))
     with GraphBuilder(replace(config, detections=str(path))) as builder:
-        graph = builder.build(noise(1), STAMP_NS + 9 * MS)
+        graph = builder.build(make.noise(1), STAMP_NS + 9 * MS)
         assert graph.label[:graph.object_count].tolist() == [2, 1]
         assert graph.size[:2].tolist() == [[30, 30], [40, 40]]
         assert graph.node_count > graph.object_count
-        assert builder.build(noise(1), STAMP_NS + 11 * MS).object_count == 0
+        assert builder.build(make.noise(1), STAMP_NS + 11 * MS).object_count == 0
 
 
 def test_detections_that_are_not_named_are_asked_for(config):
@@ -152,7 +146,7 @@ def test_detections_that_are_not_named_are_asked_for(config):
 def test_a_topic_is_the_nodes(config):
     with GraphBuilder(replace(config, detector='topic')) as builder, pytest.raises(
             ConfigError, match='only the node'):
-        builder.build(noise(1), STAMP_NS)
+        builder.build(make.noise(1), STAMP_NS)
 
 
 def test_detections_without_pictures_are_a_sequence(folder):

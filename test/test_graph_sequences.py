@@ -36,19 +36,6 @@ def built(monkeypatch):
     return calls
 
 
-def noise(seed):
-    coarse = np.random.default_rng(seed).integers(0, 256, (24, 32), np.uint8)
-    return cv2.resize(coarse, (160, 120), interpolation=cv2.INTER_CUBIC)
-
-
-def textured(folder):
-    """Return a folder in TUM's layout with frames that have features."""
-    make.tum_folder(folder)
-    for number, path in enumerate(sorted((folder / 'rgb').iterdir())):
-        path.write_bytes(make.encoded(noise(number)))
-    return folder
-
-
 def graph_rows(topic='/graph', count=4):
     types = make.ROS2
     for number, stamp in enumerate(make.stamps(count)):
@@ -59,7 +46,7 @@ def graph_rows(topic='/graph', count=4):
 
 
 def test_graphs_are_those_of_the_builder_and_built_once(tmp_path, config, built):
-    folder, progress = textured(tmp_path / 'desk'), []
+    folder, progress = make.textured_folder(tmp_path / 'desk'), []
     first = open_graphs(str(folder), config, tmp_path / 'cache',
                         lambda *now: progress.append(now))
     assert progress == [(1, 4), (2, 4), (3, 4), (4, 4)]
@@ -81,12 +68,12 @@ def test_graphs_are_those_of_the_builder_and_built_once(tmp_path, config, built)
 
 def test_the_default_cache_is_the_users(tmp_path, config, monkeypatch):
     monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path / 'mine'))
-    open_graphs(str(textured(tmp_path / 'desk')), config)
+    open_graphs(str(make.textured_folder(tmp_path / 'desk')), config)
     assert len(list((tmp_path / 'mine' / 'graphs').glob('*.npz'))) == 1
 
 
 def test_a_part_has_its_frames_with_their_numbers(tmp_path, config):
-    folder = textured(tmp_path / 'desk')
+    folder = make.textured_folder(tmp_path / 'desk')
     part = open_graphs(f'{folder}@0.5:1', config, tmp_path / 'cache')
     assert [(graph.sequence, graph.stamp_ns) for graph in part.graphs] == [
         (2, make.stamps()[2]), (3, make.stamps()[3])]
@@ -97,7 +84,7 @@ def test_a_part_has_its_frames_with_their_numbers(tmp_path, config):
 
 def change_picture(folder, config, vocabulary):
     first = sorted((folder / 'rgb').iterdir())[0]
-    first.write_bytes(make.encoded(noise(99)))
+    first.write_bytes(make.encoded(make.noise(99)))
     return config
 
 
@@ -115,14 +102,14 @@ def change_vocabulary(folder, config, vocabulary):
 @pytest.mark.parametrize('change', [change_picture, change_settings, change_vocabulary])
 def test_what_a_graph_is_made_of_decides_whether_it_is_built_anew(tmp_path, config, vocabulary,
                                                                   built, change):
-    folder = textured(tmp_path / 'desk')
+    folder = make.textured_folder(tmp_path / 'desk')
     open_graphs(str(folder), config, tmp_path / 'cache')
     open_graphs(str(folder), change(folder, config, vocabulary), tmp_path / 'cache')
     assert len(built) == 8
 
 
 def test_threads_do_not_matter(tmp_path, config, built):
-    folder = textured(tmp_path / 'desk')
+    folder = make.textured_folder(tmp_path / 'desk')
     for threads in (1, 2):
         open_graphs(str(folder), replace(config, threads=threads), tmp_path / 'cache')
     assert len(built) == 4
@@ -132,7 +119,7 @@ def test_threads_do_not_matter(tmp_path, config, built):
     lambda data: data[:100], lambda data: b'', lambda data: data[:-2000] + b'x' * 2000,
     lambda data: data[:3000] + bytes([data[3000] ^ 1]) + data[3001:]])
 def test_a_damaged_cache_is_built_again_and_says_so(tmp_path, config, built, caplog, damage):
-    folder, cache = textured(tmp_path / 'desk'), tmp_path / 'cache'
+    folder, cache = make.textured_folder(tmp_path / 'desk'), tmp_path / 'cache'
     before = open_graphs(str(folder), config, cache)
     file, = cache.iterdir()
     whole = file.read_bytes()
@@ -149,7 +136,7 @@ def test_a_run_that_breaks_off_leaves_nothing(tmp_path, config, monkeypatch):
         raise KeyboardInterrupt
     monkeypatch.setattr(graph_sequences, 'save_graphs', broken)
     with pytest.raises(KeyboardInterrupt):
-        open_graphs(str(textured(tmp_path / 'desk')), config, tmp_path / 'cache')
+        open_graphs(str(make.textured_folder(tmp_path / 'desk')), config, tmp_path / 'cache')
     assert not (tmp_path / 'cache').exists()
 
 
@@ -161,7 +148,7 @@ def test_no_graphs_can_be_kept(tmp_path):
 def test_a_cache_that_cannot_be_written_is_said(tmp_path, config):
     (tmp_path / 'cache').write_text('a file')
     with pytest.raises(EvaluationError, match='ADVERSARIAL_LCD_CACHE'):
-        open_graphs(str(textured(tmp_path / 'desk')), config, tmp_path / 'cache')
+        open_graphs(str(make.textured_folder(tmp_path / 'desk')), config, tmp_path / 'cache')
 
 
 def test_graphs_of_a_bag_are_taken_as_they_are(tmp_path, config, built):

@@ -30,7 +30,8 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands, 'evaluate',
         'Replay a bag clean and attacked, and report what the attack cost.', _evaluate)
-    parser.add_argument('bag', type=Path, help='bag with ground truth, made by "import"')
+    parser.add_argument('bag', type=Path, help='bag with ground truth, made by "import" or '
+                        '"build"')
     _add_evaluation_options(parser, 'BAG [OPTIONS]')
 
 

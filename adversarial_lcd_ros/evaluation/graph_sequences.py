@@ -89,7 +89,7 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
 
     """
     part = TrainingSource.parse(source)
-    if is_bag(part.path) and _holds_graphs(part.path):
+    if holds_graphs(part.path):
         return _recorded_graphs(part)
     sequence = open_sequence(part.path)
     config = for_sequence(config, sequence)
@@ -199,7 +199,10 @@ def _name(name: str, numbers: range, count: int) -> str:
     return f'{name}, frames {numbers[0]} to {numbers[-1]} of {count}'
 
 
-def _holds_graphs(path: Path) -> bool:
+def holds_graphs(path: Path) -> bool:
+    """Tell whether a path is a bag that has graphs, or other payloads, and no images."""
+    if not is_bag(path):
+        return False
     with BagFile(path) as bag:
         return not bag.of_type(IMAGE, COMPRESSED_IMAGE) and bool(bag.of_type(PAYLOAD))
 

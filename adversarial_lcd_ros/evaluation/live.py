@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import (
     AttackConfig,
@@ -19,6 +20,12 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.graph_bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
+from adversarial_lcd_ros.evaluation.graph_sequences import (
+    GraphSequence,
+    holds_graphs,
+    open_graphs,
+)
 from adversarial_lcd_ros.evaluation.labels import label_frames
 from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
 from adversarial_lcd_ros.evaluation.pipeline import Recording, Setup, run_pipeline
@@ -37,10 +44,12 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.replay import Replay
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.vision.draw import draw_attack
 
 RECORDINGS = 'recordings'
 PICTURES = 6
+BLANK_GREY = 64
 
 
 @dataclass(frozen=True)
@@ -51,7 +60,8 @@ class Plan:
     Attributes
     ----------
     builder, lcd, labels, replay
-        Settings; the replay is in lockstep, whatever they say.
+        Settings; the replay is in lockstep, whatever they say. None for a builder: the bag has
+        graphs.
     attacks : mapping
         Settings of every attack by the name of its run.
     rebuild : bool
@@ -62,7 +72,7 @@ class Plan:
 
     """
 
-    builder: BuilderConfig
+    builder: BuilderConfig | None
     lcd: LcdConfig
     labels: LabelConfig
     replay: ReplayConfig
@@ -80,7 +90,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     Parameters
     ----------
     bag : Path
-        Bag with images and ground truth, as "adversarial-lcd import" writes it.
+        Bag with images and ground truth, as "adversarial-lcd import" writes it; or with graphs
+        and ground truth, as "adversarial-lcd build" does: these are used as they are, whatever
+        the settings of the builder.
     output : Path
         Folder in which the results folder is made.
     plan : Plan
@@ -98,14 +110,16 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
 
     """
     started_s = time.monotonic()
-    sequence = open_sequence(bag)
+    if holds_graphs(bag):
+        plan = _without_builder(bag, plan, tell)
+    sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
     if sequence.trajectory is None:
         raise EvaluationError(f'{bag} has no ground truth: without it nobody can tell what is a '
                               'loop; import it again with --ground-truth')
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
     frames = Replay(bag, plan.replay).frame_count
     folder = ResultsFolder.create(output)
-    runs = _replay(bag, plan, frames, folder.path / RECORDINGS, tell)
+    runs = _replay(bag, sequence, plan, frames, folder.path / RECORDINGS, tell)
     tell('labels, figures and pictures')
     clean = runs.pop(CLEAN)
     labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in clean.clean],
@@ -125,22 +139,34 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     return folder.finish(), summary
 
 
-def _replay(bag: Path, plan: Plan, frames: int, folder: Path,
-            tell: Callable[[str], None]) -> dict[str, Recording]:
+def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
+    if plan.rebuild:
+        raise EvaluationError(f'{bag} has graphs and no images: nothing can be rebuilt')
+    tell('the bag has graphs: they are used as they are, without a graph_builder')
+    return replace(plan, builder=None)
+
+
+def _replay(bag: Path, sequence: CameraSequence | GraphSequence, plan: Plan, frames: int,
+            folder: Path, tell: Callable[[str], None]) -> dict[str, Recording]:
     """Replay the bag clean and under every attack; return the recordings by name of the run."""
     runs: dict[str, Recording] = {}
     for number, (name, attack) in enumerate([(CLEAN, None), *plan.attacks.items()]):
-        from_images = plan.rebuild or number < 2
+        from_bag = plan.rebuild or number < 2
         tell(f'run {number + 1} of {len(plan.attacks) + 1}: {name}'
-             + ('' if from_images else ' (from the graphs of run 2)'))
+             + ('' if from_bag else ' (from the graphs of run 2)'))
         setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
-        if not from_images:
+        source = bag
+        if isinstance(sequence, GraphSequence) and from_bag:
+            # Where the graphs enter the pipeline depends on whether somebody is in the middle.
+            source = folder / f'graphs_{number}'
+            with BagWriter(source) as copy:
+                write_graphs(copy, sequence, CLEAN_TOPIC if attack else GRAPH_TOPIC)
+        if not from_bag:
             # The recording holds the chosen frames only: nothing is to be skipped again.
             replay = ReplayConfig(lockstep=True, window=plan.replay.window,
                                   timeout_s=plan.replay.timeout_s, clock=plan.replay.clock)
-            setup = Setup(None, plan.lcd, replay, attack)
-        runs[name] = run_pipeline(bag if from_images else folder / '1' / 'recording', setup,
-                                  folder / f'{number}')
+            source, setup = folder / '1' / 'recording', Setup(None, plan.lcd, replay, attack)
+        runs[name] = run_pipeline(source, setup, folder / f'{number}')
         _check(name, runs[name], frames)
     return runs
 
@@ -169,15 +195,26 @@ def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]
 def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
            records: Sequence[QueryRecord], command_line: Sequence[str],
            pictures: Sequence[Picture]) -> None:
-    folder.write_setup([plan.builder, plan.lcd, plan.labels, plan.replay,
-                        *plan.attacks.values()], command_line, plan.seed)
+    sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
+    folder.write_setup([section for section in sections if section], command_line, plan.seed)
     folder.write_json(SUMMARY, summary)
     write_records(folder.path / RECORDS, records)
     write_report(folder.path, summary, records, pictures)
 
 
-def _pictures(sequence: CameraSequence, clean: Recording, runs: Mapping[str, Recording],
-              records: Sequence[QueryRecord], summary: Mapping[str, Any]) -> list[Picture]:
+def _images(sequence: CameraSequence | GraphSequence,
+            wanted: set[int]) -> dict[int, NDArray[np.uint8]]:
+    """Return the frames with these stamps; blank ones where there are only graphs."""
+    if isinstance(sequence, GraphSequence):
+        width, height = sequence.image_size
+        return dict.fromkeys(wanted, np.full((height, width, 3), BLANK_GREY, np.uint8))
+    return {frame.stamp_ns: frame.image() for frame in sequence.frames()
+            if frame.stamp_ns in wanted}
+
+
+def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
+              runs: Mapping[str, Recording], records: Sequence[QueryRecord],
+              summary: Mapping[str, Any]) -> list[Picture]:
     """Return query, match and attacked graph of telling frames of the strongest attack."""
     if not runs:
         return []
@@ -187,8 +224,7 @@ def _pictures(sequence: CameraSequence, clean: Recording, runs: Mapping[str, Rec
     wanted = {record.stamp_ns for record in chosen} | {
         clean.clean[record.match_frame].stamp_ns for record in chosen
         if record.match_frame is not None}
-    image = {frame.stamp_ns: frame.image() for frame in sequence.frames()
-             if frame.stamp_ns in wanted}
+    image = _images(sequence, wanted)
     pictures = []
     for record in chosen:
         title, caption = describe(record, by_run[CLEAN][record.frame])

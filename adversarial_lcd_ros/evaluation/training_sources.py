@@ -177,7 +177,7 @@ def open_source(source: TrainingSource) -> TrainingFrames:
                             'loops; put a groundtruth.txt beside the frames, or import the '
                             'sequence with --ground-truth')
     return TrainingFrames(source, sequence, sequence.trajectory,
-                          source.numbers(sequence.frame_count), _terms(source.path))
+                          source.numbers(sequence.frame_count), terms_of(source.path))
 
 
 def with_licences(sources: list[TrainingSource], licences: list[str]) -> list[TrainingSource]:
@@ -199,7 +199,8 @@ def with_licences(sources: list[TrainingSource], licences: list[str]) -> list[Tr
             for source, licence in zip(sources, licences, strict=True)]
 
 
-def _terms(path: Path) -> tuple[str, ...]:
+def terms_of(path: Path) -> tuple[str, ...]:
+    """Return the names of the files with credits or a licence beside the frames, sorted."""
     folder = path if path.is_dir() else path.parent
     return tuple(sorted(file.name for file in folder.iterdir()
                         if file.is_file() and file.stem.lower() in _TERMS))

@@ -76,18 +76,18 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
         sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz)
-        poses = None if sequence.trajectory is None else sequence.trajectory.between(
-            int(sequence.stamps_ns[0]) - _MARGIN_NS, int(sequence.stamps_ns[-1]) + _MARGIN_NS)
+        poses = list(pose_messages(sequence.trajectory, int(sequence.stamps_ns[0]),
+                                   int(sequence.stamps_ns[-1])))
         frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
         # At the same time, the pose comes first: the key sorts by nothing else.
         for message_topic, message_type, stamp_ns, cdr in heapq.merge(
-                _pose_messages(poses), map(_image_message, frames), key=lambda row: row[2]):
+                poses, map(_image_message, frames), key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
         for file in _terms(Path(source)):
             bag.attach(file)
     path = Path(destination)
     return ImportSummary(
-        path, sequence.name, sequence.frame_count, 0 if poses is None else len(poses),
+        path, sequence.name, sequence.frame_count, len(poses),
         sequence.image_size, float(sequence.stamps_ns[-1] - sequence.stamps_ns[0]) / 1e9,
         sum(file.stat().st_size for file in path.iterdir()))
 
@@ -117,9 +117,20 @@ def _image_message(frame: Frame) -> tuple[str, str, int, bytes]:
             bytes(typestore().serialize_cdr(message, COMPRESSED_IMAGE)))
 
 
-def _pose_messages(trajectory: Trajectory | None) -> Iterator[tuple[str, str, int, bytes]]:
+def pose_messages(trajectory: Trajectory | None, first_ns: int,
+                  last_ns: int) -> Iterator[tuple[str, str, int, bytes]]:
+    """
+    Yield the ground truth of the frames between two stamps: (topic, type, stamp, CDR).
+
+    Raises
+    ------
+    SequenceError
+        There is ground truth, but none of that time.
+
+    """
     if trajectory is None:
         return
+    trajectory = trajectory.between(first_ns - _MARGIN_NS, last_ns + _MARGIN_NS)
     types: Any = typestore().types
     point, quaternion, pose = (types[f'geometry_msgs/msg/{name}']
                                for name in ('Point', 'Quaternion', 'Pose'))

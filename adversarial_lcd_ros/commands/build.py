@@ -1,0 +1,45 @@
+"""adversarial-lcd build: the graphs of a sequence into a bag."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
+from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.settings import add_config_options, config_from_options
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands, 'build', 'Build the graphs of a sequence into a bag, which replays without '
+        'images.', _build)
+    parser.add_argument('source', metavar='SOURCE',
+                        help='bag or folder, or a folder of detections without images; '
+                        'PATH@FROM:TO takes a part of its frames, PATH@0:0.5 the first half')
+    parser.add_argument('destination', type=Path, metavar='DESTINATION',
+                        help='bag to write (rosbag2, MCAP)')
+    parser.add_argument('--cache', type=Path, metavar='FOLDER',
+                        help='where built graphs are kept (default: in the cache of the user)')
+    parser.add_argument('--overwrite', action='store_true', help='replace a bag that is there')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML) of graph_builder; options of the command line win '
+                        'over it')
+    # argparse's own usage would be twenty options long before the first explanation.
+    parser.usage = f'{parser.prog} SOURCE DESTINATION [OPTIONS]'
+    add_config_options(parser, BuilderConfig)
+
+
+def _build(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.graph_bags import build_graph_bag
+
+    config = config_from_options(options, BuilderConfig)
+    with progress_bar(f'building {Path(options.source).name}') as progress:
+        done = build_graph_bag(options.source, options.destination, config, cache=options.cache,
+                               progress=progress, overwrite=options.overwrite)
+    graphs = done.graphs.graphs
+    print(f'{done.path}: {len(graphs)} graphs, '
+          f'{sum(graph.node_count for graph in graphs) / len(graphs):.1f} nodes and '
+          f'{sum(graph.edge_count for graph in graphs) / len(graphs):.1f} edges on average, '
+          f'{done.poses} poses, {done.size_bytes / 1e6:.1f} MB')
