@@ -16,7 +16,7 @@ from adversarial_lcd_ros.errors import ConfigError
 
 TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow')
 PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
-SURROGATES = ('svm_rbf', 'none')
+SURROGATES = ('svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes', 'svr', 'ard', 'none')
 MODES = ('query', 'surrogate', 'pass')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
@@ -163,6 +163,12 @@ class AttackConfig(Config):
     surrogate: str = setting(
         'svm_rbf', 'Model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
+    gamma: str = setting(
+        'paper', 'Width of the kernels rbf and poly: 1 / (2 sigma^2) as in Eq. (8), or '
+        'scikit-learn\'s "scale", 1 / (d Var).', choices=('paper', 'scale'))
+    sigma: float = setting(
+        0.0, 'Gamma paper: sigma, in standard deviations of a feature; 0: the root of '
+        'the summed variance of all.', low=0.0, high=1e6)
     ratio: float = setting(
         3e-4, 'Perturbation ratio r: floor(r n^2) edges may be flipped.', low=0.0, high=1.0)
     queries_per_edit: int = setting(
@@ -177,6 +183,10 @@ class AttackConfig(Config):
         'that ship.')
     wl_iterations: int = setting(
         2, 'Iterations H of the Weisfeiler-Lehman features of Eq. (4)-(6).', low=1, high=10)
+    wl_features: str = setting(
+        'pooled', 'Features of a perturbed graph: pooled over its nodes, which carries over '
+        'between frames, or node by node as in Eq. (5) (query mode only).',
+        choices=('pooled', 'per_graph'))
     edits: str = setting(
         'both', 'Which flips are allowed: add edges, delete edges, or both.',
         choices=('both', 'add', 'delete'))

@@ -83,9 +83,9 @@ def concatenated_features(graph: MultiTierGraph, x: NDArray[np.float64],
 
 
 def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
-                  iterations: int) -> NDArray[np.float64]:
+                  iterations: int, *, pooled: bool = True) -> NDArray[np.float64]:
     """
-    Return how each single flip changes the pooled features, times n, shape (k, 2 d H).
+    Return how each single flip changes phi, shape (k, 2 d H) pooled, else (k, n d H).
 
     Differences carry over between frames, where phi(G') itself mostly tells the frame. All flips
     go through the iterations together: a flip changes two rows of the aggregation.
@@ -98,17 +98,34 @@ def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[
     pairs : int, (k, 2)
     iterations : int
         H.
+    pooled : bool
+        Mean and deviation of each level, times n; else node by node as in Eq. (5).
 
     """
-    base = pooled_features(graph, x, iterations)
-    chunks = [_flipped(graph, x, pairs[start:start + FLIPS_AT_ONCE], iterations) - base
+    reduce = _pool if pooled else _concatenate
+    base = reduce([level[:, None] for level in
+                   iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
+    chunks = [reduce(_flipped(graph, x, pairs[start:start + FLIPS_AT_ONCE], iterations)) - base
               for start in range(0, len(pairs), FLIPS_AT_ONCE)]
-    return graph.node_count * np.concatenate([*chunks, np.zeros((0, len(base)))])
+    change: NDArray[np.float64] = np.concatenate([*chunks, np.zeros((0, base.shape[1]))])
+    return graph.node_count * change if pooled else change
+
+
+def _pool(levels: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return mean and deviation over the nodes of levels (n, k, d), shape (k, 2 d H)."""
+    return np.concatenate([pooled for level in levels
+                           for pooled in (level.mean(axis=0), level.std(axis=0))], axis=1)
+
+
+def _concatenate(levels: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the nodes of levels (n, k, d) side by side, shape (k, n d H)."""
+    return np.concatenate([level.swapaxes(0, 1).reshape(level.shape[1], -1)
+                           for level in levels], axis=1)
 
 
 def _flipped(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
-             iterations: int) -> NDArray[np.float64]:
-    """Return the pooled features after each single flip, shape (k, 2 d H)."""
+             iterations: int) -> list[NDArray[np.float64]]:
+    """Return the levels x_1 .. x_H after each single flip, each of shape (n, k, d)."""
     weight = graph.weighted_adjacency(LENGTH_SCALE)
     u, v, each = pairs[:, 0], pairs[:, 1], np.arange(len(pairs))
     step = np.where(graph.has_edges(pairs), -1, 1)
@@ -122,11 +139,11 @@ def _flipped(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.in
     lonely = (degree == 0)[:, :, None]
     scale = np.where(lonely, 0, 1 / np.where(lonely, 1, total[:, :, None]))
     level = np.repeat(x[:, None, :], len(pairs), axis=1)
-    pooled = []
+    levels = []
     for _ in range(iterations):
         mean = (weight @ level.reshape(len(x), -1)).reshape(level.shape)
         mean[u, each] += change * level[v, each]
         mean[v, each] += change * level[u, each]
         level = (level + np.where(lonely, level, scale * mean)) / 2
-        pooled += [level.mean(axis=0), level.std(axis=0)]
-    return np.concatenate(pooled, axis=1)
+        levels.append(level)
+    return levels

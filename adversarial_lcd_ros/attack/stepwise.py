@@ -12,14 +12,15 @@ from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.outcome import Hunt
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
-from adversarial_lcd_ros.attack.surrogates import Surrogate, make_surrogate
+from adversarial_lcd_ros.attack.surrogates import Kernel, Surrogate, make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.errors import BudgetError
+from adversarial_lcd_ros.errors import BudgetError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features
 
 POOL_FACTOR = 3
-REFIT_EVERY = 10
+REFIT_ROWS = 10
+REFIT_SHARE = 5
 
 
 @dataclass
@@ -38,7 +39,8 @@ class _Learner:
 
     def ranked(self, features: NDArray[np.float64], waiting: list[int]) -> list[int]:
         """Return waiting rows by falling prediction; as they were before it can predict."""
-        if len(self.gains) >= self.fitted_rows + REFIT_EVERY:
+        # A fit costs more the more rows there are: each wants a fifth more than the last one had.
+        if len(self.gains) >= self.fitted_rows + max(REFIT_ROWS, self.fitted_rows // REFIT_SHARE):
             self.fitted_rows = len(self.gains)
             self.ready = self.surrogate.fit(np.array(self.features), np.array(self.gains))
         if not self.ready:
@@ -64,9 +66,16 @@ class Stepwise:
         self._memory = Memory()
         self._trained: dict[bool, Surrogate] = {}
         if config.mode == 'surrogate':
+            if config.wl_features == 'per_graph':
+                raise ConfigError('wl_features "per_graph" belong to one frame\'s nodes: mode '
+                                  '"surrogate" needs "pooled"')
             loaded = data()
             self._bound = loaded.loop_bound()
-            self._trained = loaded.fit(lambda: make_surrogate(config.surrogate))
+            self._trained = loaded.fit(self._surrogate)
+
+    def _surrogate(self) -> Surrogate | None:
+        return make_surrogate(self._config.surrogate,
+                              Kernel(self._config.gamma, self._config.sigma))
 
     def observe(self, graph: MultiTierGraph) -> None:
         """Remember a clean graph's words, where no query tells what the detector sees in it."""
@@ -75,7 +84,7 @@ class Stepwise:
 
     def hunt(self, hunt: Hunt, rng: np.random.Generator) -> str:
         """Commit flip after flip; return why it ended."""
-        surrogate = make_surrogate(self._config.surrogate)
+        surrogate = self._surrogate()
         learner = _Learner(surrogate) if surrogate else None
         allowed = Allowed(self._config.edits)
         x = node_features(hunt.clean)
@@ -93,7 +102,8 @@ class Stepwise:
               learner: _Learner | None, x: NDArray[np.float64]) -> None:
         """Query flips of the pool, the most promising first, and commit the best."""
         before = hunt.best
-        features = (flip_features(before, x, pool, self._config.wl_iterations) if learner
+        features = (flip_features(before, x, pool, self._config.wl_iterations,
+                                  pooled=self._config.wl_features == 'pooled') if learner
                     else None)
         waiting = list(range(len(pool)))
         best: tuple[float, bool, MultiTierGraph] | None = None
