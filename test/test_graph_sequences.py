@@ -55,8 +55,10 @@ def test_graphs_are_those_of_the_builder_and_built_once(tmp_path, config, built)
     assert len(first.trajectory) == 4
     assert first.graphs[0].node_count > 0
     count = len(built)
-    again = open_graphs(str(folder), config, tmp_path / 'cache')
+    again = open_graphs(str(folder), config, tmp_path / 'cache',
+                        lambda *now: progress.append(now))
     assert len(built) == count == 4
+    assert progress[4:] == [(4, 4)]
     assert again.graphs == first.graphs
     assert len(list((tmp_path / 'cache').iterdir())) == 1
     with GraphBuilder(config) as builder:

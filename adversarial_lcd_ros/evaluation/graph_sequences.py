@@ -74,7 +74,7 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
         Folder of graphs that were built before; by default one in the user's cache. Delete it
         whenever you like.
     progress : callable, optional
-        Called with (frames done, frames in all) while graphs are built.
+        Called with (frames done, frames in all).
 
     Raises
     ------
@@ -100,6 +100,8 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
     if graphs is None:
         graphs = list(build_graphs(sequence, config, numbers, progress))
         save_graphs(path, graphs)
+    elif progress:
+        progress(len(graphs), len(graphs))
     return GraphSequence(_name(sequence.name, numbers, sequence.frame_count), graphs,
                          sequence.trajectory, sequence.image_size)
 
