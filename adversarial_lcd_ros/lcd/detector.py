@@ -22,7 +22,7 @@ CACHED_VIEWS = 256
 
 
 @dataclass
-class _QueryNodes:
+class QueryNodes:
     """
     What judging a graph leaves to reuse for its perturbations.
 
@@ -38,8 +38,9 @@ class _QueryNodes:
         Keyframes, r' of them.
     average : float64, (r', r)
         Weight of each reference in the window of each candidate.
-    scores : callable or None
-        Scores of a View with every reference; None without a candidate.
+    comparison : Comparison
+    scores : callable
+        Scores of a View with every reference.
 
     """
 
@@ -48,7 +49,8 @@ class _QueryNodes:
     bow: NDArray[np.float64]
     candidates: list[int]
     average: NDArray[np.float64]
-    scores: Scores | None
+    comparison: Comparison
+    scores: Scores
 
 
 class LoopClosureDetector:
@@ -66,10 +68,10 @@ class LoopClosureDetector:
         self._target = make_target(self.config.target)
         path = (Path(self.config.model) if self.config.model
                 else model_path(f'target_{self.config.target}.json'))
-        self._decision = Decision.load(path, self._target.name, self._target.channels)
+        self.decision = Decision.load(path, self._target.name, self._target.channels)
         self._database = Database()
         self._view = lru_cache(CACHED_VIEWS)(lambda index: View(self._database[index]))
-        self._latest: _QueryNodes | None = None
+        self._latest: QueryNodes | None = None
 
     @property
     def keyframe_count(self) -> int:
@@ -92,11 +94,11 @@ class LoopClosureDetector:
 
     def judge(self, graph: MultiTierGraph) -> LoopClosure:
         """Decide whether a graph closes a loop with a keyframe; remembers nothing."""
-        nodes = self._query_nodes(graph)
-        if nodes.scores is None:
+        nodes = self.query_nodes(graph)
+        if not nodes.candidates:
             return LoopClosure(graph.stamp_ns, graph.frame_id, graph.sequence,
                                is_loop=False, probability=0.0)
-        logit = self._decision.logit(nodes.average @ nodes.scores(View(graph, nodes.base)))
+        logit = self.log_odds(graph)
         best = int(logit.argmax())
         keyframe = nodes.candidates[best]
         chance = probability(float(logit[best]))
@@ -107,26 +109,32 @@ class LoopClosureDetector:
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
             vbow_score=float(nodes.bow[keyframe]), candidates=len(nodes.candidates))
 
-    def _query_nodes(self, graph: MultiTierGraph) -> _QueryNodes:
+    def log_odds(self, graph: MultiTierGraph) -> NDArray[np.float64]:
+        """Return the log odds of a loop with each candidate, the most alike by words first."""
+        nodes = self.query_nodes(graph)
+        if not nodes.candidates:
+            return np.zeros(0)
+        return self.decision.logit(nodes.average @ nodes.scores(View(graph, nodes.base)))
+
+    def query_nodes(self, graph: MultiTierGraph) -> QueryNodes:
+        """Return what flips of a graph leave alone; kept until other nodes are asked about."""
         key = (graph.node_digest, graph.word.tobytes(), graph.word_weight.tobytes(),
                graph.stamp_ns, len(self._database))
         if self._latest is None or self._latest.key != key:
             self._latest = self._compare_nodes(graph, key)
         return self._latest
 
-    def _compare_nodes(self, graph: MultiTierGraph, key: tuple[object, ...]) -> _QueryNodes:
+    def _compare_nodes(self, graph: MultiTierGraph, key: tuple[object, ...]) -> QueryNodes:
         old = self._database.admissible(graph.stamp_ns, round(self.config.min_gap_s * 1e9))
         bow = self._database.scores(graph)
         candidates = self._retrieve(bow, old)
-        query = View(graph)
-        if not candidates:
-            return _QueryNodes(key, query, bow, [], np.zeros((0, 0)), None)
         around = [self._window(candidate, old) for candidate in candidates]
         keyframes = sorted({keyframe for window in around for keyframe in window})
-        comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
         average = np.array([np.isin(keyframes, window) / len(window) for window in around])
-        return _QueryNodes(key, query, bow, candidates, average,
-                           prepare(self._target, query, comparison))
+        query = View(graph)
+        comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
+        return QueryNodes(key, query, bow, candidates, average, comparison,
+                          prepare(self._target, query, comparison))
 
     def _retrieve(self, bow: NDArray[np.float64], old: NDArray[np.bool_]) -> list[int]:
         """Return keyframes by falling vBoW score, none in another's map window."""

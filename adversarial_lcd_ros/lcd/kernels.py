@@ -109,7 +109,8 @@ def iterated_rows(nodes: NDArray[np.int64], x0: NDArray[np.int8], start: NDArray
 
 
 @vectorised
-def _dot(one: NDArray[np.float64], other: NDArray[np.float32]) -> float:
+def dot(one: NDArray[np.float64], other: NDArray[np.float32]) -> float:
+    """Return the scalar product of two rows, summed in the wider type."""
     total = 0.0
     for j in range(len(one)):
         total += one[j] * other[j]
@@ -138,7 +139,7 @@ def write_match_scores(nodes: NDArray[np.int64], rows: NDArray[np.float64],
     """
     for i in range(len(nodes)):
         for k in range(start[nodes[i]], start[nodes[i] + 1]):
-            score[k] = sqrt(max(_dot(rows[i], match_x1[k]) - MIN_COSINE, 0.0))
+            score[k] = sqrt(max(dot(rows[i], match_x1[k]) - MIN_COSINE, 0.0))
 
 
 @vectorised
@@ -163,7 +164,7 @@ def write_cosines(nodes: NDArray[np.int64], rows: NDArray[np.float64],
     for i in range(len(nodes)):
         for k in range(len(other_x1)):
             found = comparable[nodes[i], k]
-            cosine[nodes[i], k] = _dot(rows[i], other_x1[k]) if found else 0.0
+            cosine[nodes[i], k] = dot(rows[i], other_x1[k]) if found else 0.0
 
 
 @compiled

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +123,7 @@ class Comparison:
         self.edges = np.array([view.graph.edge_count for view in references], np.int64)
         self._query_nodes = query.graph.node_count
         self._query_labels = query.graph.label[:query.objects]
-        nodes = np.concatenate([match.query for match in self.matches])
+        nodes = _join([match.query for match in self.matches], np.int64)
         self._order = np.argsort(nodes, kind='stable')
         self.match_query = nodes[self._order]
 
@@ -150,13 +151,13 @@ class Comparison:
     @cached_property
     def match_weight(self) -> NDArray[np.float64]:
         """Weight of each matched feature, shape (k,)."""
-        weights = np.concatenate([match.weight for match in self.matches])
-        return weights[self._order].astype(np.float64)
+        weights = _join([match.weight for match in self.matches], np.float64)
+        return weights[self._order]
 
     @cached_property
     def match_x1(self) -> NDArray[np.float32]:
         """Reference's features after one WL iteration, of each matched feature, (k, 256)."""
-        rows = np.empty((len(self.match_query), _BITS), np.float32)
+        rows: NDArray[np.float32] = np.empty((len(self.match_query), _BITS), np.float32)
         for owner, (view, match) in enumerate(zip(self.references, self.matches, strict=True)):
             rows[self.match_owner == owner] = view.x1[match.reference]
         return rows
@@ -164,7 +165,7 @@ class Comparison:
     @cached_property
     def object_x1(self) -> NDArray[np.float32]:
         """Reference's objects after one WL iteration, shape (sum of objects, 256)."""
-        return np.concatenate([view.x1[:view.objects] for view in self.references])
+        return _join([view.x1[:view.objects] for view in self.references], np.float32, _BITS)
 
     @cached_property
     def object_owner(self) -> NDArray[np.int64]:
@@ -184,8 +185,8 @@ class Comparison:
     @cached_property
     def same_class(self) -> NDArray[np.bool_]:
         """Whether an object of the query has a reference's class, (objects, sum of objects)."""
-        labels = [view.graph.label[:view.objects] for view in self.references]
-        same: NDArray[np.bool_] = self._query_labels[:, None] == np.concatenate(labels)
+        labels = _join([view.graph.label[:view.objects] for view in self.references], np.uint32)
+        same: NDArray[np.bool_] = self._query_labels[:, None] == labels
         return same
 
     @cached_property
@@ -213,6 +214,11 @@ class Comparison:
             keys.append((np.minimum(u, v) * self._query_nodes + np.maximum(u, v))[both])
             weights.append((weight[view.graph.edge[:, 0]] * weight[view.graph.edge[:, 1]])[both])
             owners.append(np.full(len(keys[-1]), owner))
-        order = np.argsort(np.concatenate(keys), kind='stable')
-        return (np.concatenate(keys)[order], np.concatenate(weights)[order],
-                np.concatenate(owners)[order])
+        key = _join(keys, np.int64)
+        order = np.argsort(key, kind='stable')
+        return key[order], _join(weights, np.float64)[order], _join(owners, np.int64)[order]
+
+
+def _join(parts: Sequence[NDArray[Any]], dtype: type, *tail: int) -> NDArray[Any]:
+    """Return arrays one after the other, also if there are none."""
+    return np.concatenate([np.zeros((0, *tail), dtype), *parts], dtype=dtype)
