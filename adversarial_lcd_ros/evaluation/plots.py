@@ -17,10 +17,10 @@ from adversarial_lcd_ros.evaluation.summary import run_metrics
 
 CLEAN_COLOUR = '#2f5d8a'
 ATTACK_COLOURS = ('#c0392b', '#d08700', '#7a4a9c', '#2e8064', '#8c564b', '#5f6b73')
-_LOOP_SHADE, _NEW_SHADE, _INK, _GRID = '#dcebd9', '#e9e9ee', '#33373d', '#dddfe3'
-_STYLE = {
+_LOOP_SHADE, _NEW_SHADE, INK, GRID = '#dcebd9', '#e9e9ee', '#33373d', '#dddfe3'
+STYLE = {
     'font.family': 'DejaVu Sans', 'font.size': 9.0, 'axes.edgecolor': '#9aa0a8',
-    'axes.labelcolor': _INK, 'text.color': _INK, 'xtick.color': _INK, 'ytick.color': _INK,
+    'axes.labelcolor': INK, 'text.color': INK, 'xtick.color': INK, 'ytick.color': INK,
     'axes.spines.top': False, 'axes.spines.right': False, 'axes.linewidth': 0.8,
     'xtick.major.size': 3.0, 'ytick.major.size': 3.0, 'legend.frameon': False,
     'svg.hashsalt': 'adversarial_lcd_ros'}
@@ -53,7 +53,7 @@ def precision_recall(clean: Sequence[QueryRecord], attacks: Sequence[Run]) -> by
     runs = [('before', CLEAN_COLOUR, clean)]
     runs += [(title, attack_colour(index), run) for index, (title, run) in enumerate(attacks)]
     measured = [(title, colour, run_metrics(run)) for title, colour, run in runs]
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(4.9, 3.7), layout='constrained')
         axes = figure.subplots()
         for title, colour, metrics in measured:
@@ -68,9 +68,9 @@ def precision_recall(clean: Sequence[QueryRecord], attacks: Sequence[Run]) -> by
                 axes.plot(metrics.recall, metrics.precision, 'o', color=colour, markersize=5,
                           markeredgecolor='white', clip_on=False, zorder=3)
         axes.set(xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.03))
-        axes.grid(color=_GRID, linewidth=0.6)
+        axes.grid(color=GRID, linewidth=0.6)
         axes.legend(loc='lower left', fontsize=8.0)
-        return _svg(figure)
+        return svg(figure)
 
 
 def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: float,
@@ -92,7 +92,7 @@ def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: fl
 
     """
     time_s = (column(clean, 'stamp_ns') - clean[0].stamp_ns) * 1e-9
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         rows = max(len(attacks), 1)
         figure = Figure(figsize=(width, _ROW_HEIGHT * rows + 0.5), layout='constrained')
         panels = figure.subplots(rows, sharex=True, squeeze=False)[:, 0]
@@ -108,7 +108,7 @@ def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: fl
             panel.set_title(title, loc='left', fontsize=9.0, color=attack_colour(index))
         panels[-1].set(xlabel='time in the sequence, seconds',
                        xlim=(time_s[0], max(time_s[-1], time_s[0] + 1e-3)))
-        return _svg(figure)
+        return svg(figure)
 
 
 def _shade(panel: Any, time_s: NDArray[np.float64], kind: NDArray[np.int8]) -> None:
@@ -125,7 +125,8 @@ def _mark(panel: Any, time_s: NDArray[np.float64], effects: NDArray[np.str_],
                    markersize=4.0, markeredgewidth=0)
 
 
-def _svg(figure: Any) -> bytes:
+def svg(figure: Any) -> bytes:
+    """Return a figure as SVG, the same bytes for the same figure."""
     stream = io.BytesIO()
     figure.savefig(stream, format='svg', metadata={'Date': None})
     return stream.getvalue()

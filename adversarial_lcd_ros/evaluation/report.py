@@ -90,28 +90,31 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
         'headline': wording.headline(summary),
         'decline_rows': wording.decline_rows(summary),
         'figure_rows': wording.figure_rows(summary),
-        'curve': None if curve is None else _uri(curve, 'svg+xml'),
-        'timeline_wide': _uri(plots.timeline(clean, attacks, threshold, plots.WIDE), 'svg+xml'),
-        'timeline_narrow': _uri(plots.timeline(clean, attacks, threshold, plots.NARROW),
-                                'svg+xml'),
-        'pictures': [(title, caption, _uri(data, 'jpeg'))
+        'curve': None if curve is None else data_uri(curve, 'svg+xml'),
+        'timeline_wide': data_uri(plots.timeline(clean, attacks, threshold, plots.WIDE),
+                                  'svg+xml'),
+        'timeline_narrow': data_uri(plots.timeline(clean, attacks, threshold, plots.NARROW),
+                                    'svg+xml'),
+        'pictures': [(title, caption, data_uri(data, 'jpeg'))
                      for title, caption, data in read_pictures(folder)],
         'sample': _sample(summary), 'configuration': configuration,
         'command_line': shlex.join(configuration['command_line']),
         'environment': read_json(folder / ENVIRONMENT)}
     path = folder / REPORT
-    path.write_text(_template().render(values), encoding='utf-8')
+    path.write_text(load_template('report.html.j2').render(values), encoding='utf-8')
     return path
 
 
-def _template() -> Any:
+def load_template(name: str) -> Any:
+    """Return a page of the folder templates; a name it lacks is an error."""
     environment = Environment(loader=PackageLoader('adversarial_lcd_ros.evaluation'),
                               autoescape=True, undefined=StrictUndefined, trim_blocks=True,
                               lstrip_blocks=True)
-    return environment.get_template('report.html.j2')
+    return environment.get_template(name)
 
 
-def _uri(data: bytes, subtype: str) -> str:
+def data_uri(data: bytes, subtype: str) -> str:
+    """Return an image as a link that holds it."""
     return f'data:image/{subtype};base64,{b64encode(data).decode("ascii")}'
 
 

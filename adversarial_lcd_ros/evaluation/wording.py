@@ -20,10 +20,25 @@ def attack_title(attack: Attack) -> str:
         return str(attack['name'])
     if attack['mode'] == 'pass':
         return 'control: forwarded unchanged'
-    parts = [attack['perturbation'].replace('_', ' ')]
-    if attack['surrogate'] != 'none':
-        parts.append(_SURROGATE.get(attack['surrogate'], attack['surrogate'].replace('_', ' ')))
-    return f'{" + ".join(parts)}, {_MODE.get(attack["mode"], attack["mode"])}'
+    return f'{method_title(attack)}, {mode_title(attack["mode"])}'
+
+
+def method_title(attack: Attack) -> str:
+    """Return perturbation and surrogate of an attack, in words."""
+    perturbation = str(attack['perturbation']).replace('_', ' ')
+    if attack['surrogate'] == 'none':
+        return perturbation
+    return f'{perturbation} + {surrogate_title(attack["surrogate"])}'
+
+
+def surrogate_title(surrogate: str) -> str:
+    """Return a surrogate in words."""
+    return _SURROGATE.get(surrogate, surrogate.replace('_', ' '))
+
+
+def mode_title(mode: str) -> str:
+    """Return how an attack uses its queries, in words."""
+    return _MODE.get(mode, mode)
 
 
 def percent(value: float | None, digits: int = 1) -> str:

@@ -1,0 +1,106 @@
+"""The paper's experiments as CSV, JSON and LaTeX tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.paper_statistics import Cell, Row
+from adversarial_lcd_ros.evaluation.paper_views import DeclineTable, Line
+
+SUMMARY, CELLS_CSV, SUMMARY_CSV, TABLES_TEX = (
+    'summary.json', 'cells.csv', 'summary.csv', 'tables.tex')
+_LATEX = {'\\': r'\textbackslash{}', '&': r'\&', '%': r'\%', '$': r'\$', '#': r'\#', '_': r'\_',
+          '{': r'\{', '}': r'\}', '~': r'\textasciitilde{}', '^': r'\textasciicircum{}',
+          '<': '$<$', '>': '$>$', '|': '$|$', '"': "''",
+          '→': r'$\rightarrow$', '–': '--', '\u202f': r'\,'}
+_TEX_HEAD = """\
+% Declines in balanced accuracy, percentage points; positive: lost. Needs \\usepackage{booktabs}.
+% \\input this file, or copy a table from it.
+"""
+
+
+def write_exports(folder: Path, rows: Iterable[Row], cells: Sequence[Cell],
+                  tables: Sequence[DeclineTable]) -> list[Path]:
+    """
+    Write summary.json, summary.csv, cells.csv and tables.tex; return their paths.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    rows : iterable of mapping
+        One a cell and seed: cells.csv, without the frames.
+    cells : sequence of dict
+        From ``summarise_cells``: summary.json and summary.csv.
+    tables : sequence of DeclineTable
+        tables.tex.
+
+    """
+    plain = [{name: value for name, value in row.items() if name != 'frame_results'}
+             for row in rows]
+    texts = {SUMMARY: json.dumps(list(cells), indent=2, allow_nan=False) + '\n',
+             TABLES_TEX: _TEX_HEAD + '\n'.join(latex_table(table) for table in tables)}
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    flat = [{**cell, 'ci95': None, **_bounds(cell)} for cell in cells]
+    for line in flat:
+        del line['ci95']
+    _write_csv(folder / SUMMARY_CSV, flat)
+    _write_csv(folder / CELLS_CSV, plain)
+    return [folder / name for name in (SUMMARY, SUMMARY_CSV, CELLS_CSV, TABLES_TEX)]
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that is there whole or not at all."""
+    draft = path.with_name(f'.{path.name}.partial')
+    draft.write_text(text, encoding='utf-8')
+    draft.replace(path)
+
+
+def latex_escape(text: str) -> str:
+    """Return a text in which nothing is special to LaTeX."""
+    return ''.join(_LATEX.get(character, character) for character in text)
+
+
+def latex_table(table: DeclineTable) -> str:
+    """Return a table in the shape of the paper's, with booktabs rules; the best is bold."""
+    columns = ['before', *table.columns]
+    head = ' & '.join(latex_escape(name) for name in ('', *columns))
+    lines = [_latex_line(line, line.strongest) for line in table.lines]
+    if table.mean is not None:
+        lines += [r'\midrule', _latex_line(table.mean, table.mean.strongest)]
+    caption = (f'In the shape of Table {table.printed.number} of the paper: decline in balanced '
+               f'accuracy, percentage points; {table.title}.')
+    body = '\n'.join(lines)
+    return (f'\\begin{{table}}[ht]\n\\centering\n\\caption{{{latex_escape(caption)}}}\n'
+            f'\\begin{{tabular}}{{l{"r" * len(columns)}}}\n\\toprule\n{head} \\\\\n\\midrule\n'
+            f'{body}\n\\bottomrule\n\\end{{tabular}}\n\\end{{table}}\n')
+
+
+def _latex_line(line: Line, strongest: Cell | None) -> str:
+    cells = [latex_escape(line.title), latex_escape(wording.percent(line.before))]
+    for entry in line.entries:
+        value = None if entry is None else entry['decline_pp']
+        text = '--' if value is None else wording.points(value).replace('-', '$-$')
+        cells.append(f'\\textbf{{{text}}}' if entry is not None and entry is strongest else text)
+    return ' & '.join(cells) + r' \\'
+
+
+def _bounds(cell: Mapping[str, Any]) -> dict[str, float | None]:
+    low, high = cell['ci95'] or (None, None)
+    return {'ci95_low': low, 'ci95_high': high}
+
+
+def _write_csv(path: Path, lines: Sequence[Mapping[str, Any]]) -> None:
+    names = list(dict.fromkeys(name for line in lines for name in line))
+    draft = path.with_name(f'.{path.name}.partial')
+    with draft.open('w', newline='', encoding='utf-8') as stream:
+        writer = csv.DictWriter(stream, names)
+        writer.writeheader()
+        writer.writerows(lines)
+    draft.replace(path)
