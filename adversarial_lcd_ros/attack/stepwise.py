@@ -37,12 +37,17 @@ class _Learner:
         self.features.append(features)
         self.gains.append(gain)
 
+    def refit(self) -> bool:
+        """Fit to all rows once enough of them are new; tell whether predictions changed."""
+        # A fit costs more the more rows there are: each wants a fifth more than the last one had.
+        if len(self.gains) < self.fitted_rows + max(REFIT_ROWS, self.fitted_rows // REFIT_SHARE):
+            return False
+        self.fitted_rows = len(self.gains)
+        self.ready = self.surrogate.fit(np.array(self.features), np.array(self.gains))
+        return True
+
     def ranked(self, features: NDArray[np.float64], waiting: list[int]) -> list[int]:
         """Return waiting rows by falling prediction; as they were before it can predict."""
-        # A fit costs more the more rows there are: each wants a fifth more than the last one had.
-        if len(self.gains) >= self.fitted_rows + max(REFIT_ROWS, self.fitted_rows // REFIT_SHARE):
-            self.fitted_rows = len(self.gains)
-            self.ready = self.surrogate.fit(np.array(self.features), np.array(self.gains))
         if not self.ready:
             return waiting
         order = np.argsort(-self.surrogate.predict(features[waiting]), kind='stable')
@@ -107,8 +112,8 @@ class Stepwise:
                     else None)
         waiting = list(range(len(pool)))
         best: tuple[float, bool, MultiTierGraph] | None = None
-        for _ in range(min(self._config.queries_per_edit, len(pool))):
-            if learner and features is not None:
+        for asked in range(min(self._config.queries_per_edit, len(pool))):
+            if learner and features is not None and (learner.refit() or not asked):
                 waiting = learner.ranked(features, waiting)
             place = waiting.pop(0)
             allowed.mark(before, pool[place:place + 1])
