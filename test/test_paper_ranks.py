@@ -2,6 +2,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from scipy.stats import wilcoxon
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.paper_ranks import nemenyi_difference, rank_methods
@@ -72,6 +73,14 @@ def test_two_methods_go_to_wilcoxon():
     assert 'no outcome whatever' in ranking.warnings[0]
     assert ranking.groups == (('a', 'b'),)
     assert rank_methods(table_of([[2.0 + row, 1.0] for row in range(8)])).groups == ()
+
+
+def test_two_methods_are_tested_exactly():
+    gains = np.array([1.5, -0.5, 3.0, 2.0, 0.7, 4.0])
+    ranking = rank_methods(table_of([[gain, 0.0] for gain in gains]))
+    assert ranking.p_value == pytest.approx(wilcoxon(gains, method='exact').pvalue)
+    # Equal gains in all sequences: a normal approximation would claim too much.
+    assert rank_methods(table_of([[1.0, 0.0]] * 3)).p_value == pytest.approx(2 / 2 ** 3)
 
 
 def test_no_difference_at_all():

@@ -141,7 +141,7 @@ def test_headline_is_of_the_black_box_attack():
     text = words_of(rows)
     assert 'strongest black-box attack on target wl (recall, query-guided, 300 features)' in text
     assert 'over 4 sequences' in text
-    assert 'of what the exhaustive search' in text
+    assert 'of what the greedy optimum' in text
 
 
 def test_headline_says_when_there_is_nothing():

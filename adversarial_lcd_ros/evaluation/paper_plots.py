@@ -76,7 +76,7 @@ def budget_curves(table: DeclineTable, width: float) -> bytes:
         axes.set(xlabel='perturbation ratio r', ylabel='mean decline, points',
                  xticks=ratios, xticklabels=[line.title for line in table.lines])
         axes.grid(axis='y', color=GRID, linewidth=0.6)
-        _legend(figure, axes, width)
+        _legend(axes, width)
         return svg(figure)
 
 
@@ -103,7 +103,7 @@ def success_curves(curves: Sequence[Curve], width: float) -> bytes:
                  else 'right decisions turned over, %')
         axes.xaxis.set_major_formatter('{x:,.0f}')
         axes.grid(color=GRID, linewidth=0.6)
-        _legend(figure, axes, width)
+        _legend(axes, width)
         return svg(figure)
 
 
@@ -248,9 +248,8 @@ def _height(labels: Sequence[str]) -> float:
     return max(0.34, 0.17 * lines + 0.04) * len(labels)
 
 
-def _legend(figure: Any, axes: Any, width: float) -> None:
+def _legend(axes: Any, width: float) -> None:
     # Below on a phone, where nothing is left beside the curves.
-    handles, titles = axes.get_legend_handles_labels()
-    place = {'loc': 'outside lower center', 'ncols': 2} if width <= NARROW else {
-        'loc': 'outside right upper'}
-    figure.legend(handles, titles, fontsize=8.0, **place)
+    place = ({'loc': 'upper center', 'bbox_to_anchor': (0.45, -0.2), 'ncols': 2}
+             if width <= NARROW else {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.0)})
+    axes.legend(fontsize=8.0, **place)

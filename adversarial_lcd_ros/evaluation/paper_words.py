@@ -58,7 +58,7 @@ def headline(methods: Sequence[Cell], ratio: float) -> str:
                 f'{wording.percent(best["balanced_attacked"])}')
     share = best['share_of_optimum']
     yardstick = '' if share is None else (f' That is {wording.percent(share, 0)} of what the '
-                                          'exhaustive search for the best flips takes.')
+                                          'greedy optimum over all flips takes.')
     if best['decline_pp'] < _TIE_PP:
         return (f'No black-box attack lowered the balanced accuracy of {target} on {over} at '
                 f'r = {ratio:g}; the strongest was {title}, {accuracy}.')
