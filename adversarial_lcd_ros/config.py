@@ -14,7 +14,7 @@ from typing import Any, ClassVar, TypeVar
 
 from adversarial_lcd_ros.errors import ConfigError
 
-TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow')
+TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow', 'objects')
 PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
 SURROGATES = ('svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes', 'svr', 'ard', 'none')
 MODES = ('query', 'surrogate', 'pass')

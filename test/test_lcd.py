@@ -63,6 +63,23 @@ def test_anchored_counts_spokes_and_not_edges_between_features():
     assert scores('anchored', GRAPH.flip([(0, 5)]), GRAPH)['spokes'] < clean['spokes']
 
 
+def test_objects_counts_what_recurs_in_class_size_and_arrangement():
+    classes, square = [3, 5, 5], np.array([[100, 100], [300, 100], [300, 400]], np.float32)
+    fields = {'label': np.array(classes, np.uint32), 'position': square,
+              'size': np.full((3, 2), 40, np.float32)}
+    query = make_graph(3, [(0, 1), (0, 2), (1, 2)], objects=3, **fields)
+    whole = pytest.approx({'objects': 1, 'edges': 1})
+    assert scores('objects', query, query) == whole
+    moved = make_graph(3, [(0, 1), (0, 2), (1, 2)], objects=3,
+                       **{**fields, 'position': square + np.float32([50, 20])})
+    assert scores('objects', query, moved) == whole
+    smaller = make_graph(3, [(0, 1), (0, 2), (1, 2)], objects=3,
+                         **{**fields, 'size': np.full((3, 2), 20, np.float32)})
+    assert scores('objects', query, smaller)['objects'] == pytest.approx((21 / 41) ** 2)
+    fewer = scores('objects', query.flip([[1, 2]]), query)
+    assert max(fewer.values()) < 1
+
+
 @pytest.mark.parametrize('target', ['descriptors', 'vbow'])
 @given(st.integers(0, 2**16))
 @settings(max_examples=20)

@@ -7,12 +7,14 @@ from adversarial_lcd_ros.lcd.targets.anchored import AnchoredTarget
 from adversarial_lcd_ros.lcd.targets.base import Scores, Target, prepare
 from adversarial_lcd_ros.lcd.targets.descriptors import DescriptorsTarget
 from adversarial_lcd_ros.lcd.targets.edges import EdgesTarget
+from adversarial_lcd_ros.lcd.targets.objects import ObjectsTarget
 from adversarial_lcd_ros.lcd.targets.vbow import VbowTarget
 from adversarial_lcd_ros.lcd.targets.wl import WlTarget
 
 TARGETS: dict[str, type[Target]] = {
     target.name: target
-    for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget)
+    for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget,
+                   ObjectsTarget)
 }
 
 __all__ = ['TARGETS', 'Scores', 'Target', 'make_target', 'prepare']
