@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from adversarial_lcd_ros import weisfeiler_lehman_flips
 from adversarial_lcd_ros.graph import FEATURE_TIER, MultiTierGraph
+from adversarial_lcd_ros.incidence import LENGTH_SCALE, incidence
 
-FLIPS_AT_ONCE = 128
-LENGTH_SCALE = 0.1
 NODE_FEATURES = ('is_object', 'x', 'y', 'log_size', 'score', 'log_degree')
 
 
@@ -87,8 +87,8 @@ def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[
     """
     Return how each single flip changes phi, shape (k, 2 d H) pooled, else (k, n d H).
 
-    Differences carry over between frames, where phi(G') itself mostly tells the frame. All flips
-    go through the iterations together: a flip changes two rows of the aggregation.
+    Differences carry over between frames, where phi(G') itself mostly tells the frame. Only the
+    nodes within H hops of a flip are looked at.
 
     Parameters
     ----------
@@ -102,48 +102,10 @@ def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[
         Mean and deviation of each level, times n; else node by node as in Eq. (5).
 
     """
-    reduce = _pool if pooled else _concatenate
-    base = reduce([level[:, None] for level in
-                   iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
-    chunks = [reduce(_flipped(graph, x, pairs[start:start + FLIPS_AT_ONCE], iterations)) - base
-              for start in range(0, len(pairs), FLIPS_AT_ONCE)]
-    change: NDArray[np.float64] = np.concatenate([*chunks, np.zeros((0, base.shape[1]))])
+    levels = np.stack([x, *iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
+    ends = np.ascontiguousarray(pairs, np.int64).reshape(-1, 2)
+    gained = np.exp(-graph.length_between(ends).astype(np.float64) / LENGTH_SCALE)
+    change: NDArray[np.float64] = weisfeiler_lehman_flips.changes(
+        ends, graph.has_edges(ends), gained, levels,
+        *incidence(graph.edge, graph.edge_length, graph.node_count), pooled)
     return graph.node_count * change if pooled else change
-
-
-def _pool(levels: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return mean and deviation over the nodes of levels (n, k, d), shape (k, 2 d H)."""
-    return np.concatenate([pooled for level in levels
-                           for pooled in (level.mean(axis=0), level.std(axis=0))], axis=1)
-
-
-def _concatenate(levels: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the nodes of levels (n, k, d) side by side, shape (k, n d H)."""
-    return np.concatenate([level.swapaxes(0, 1).reshape(level.shape[1], -1)
-                           for level in levels], axis=1)
-
-
-def _flipped(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[np.int64],
-             iterations: int) -> list[NDArray[np.float64]]:
-    """Return the levels x_1 .. x_H after each single flip, each of shape (n, k, d)."""
-    weight = graph.weighted_adjacency(LENGTH_SCALE)
-    u, v, each = pairs[:, 0], pairs[:, 1], np.arange(len(pairs))
-    step = np.where(graph.has_edges(pairs), -1, 1)
-    length = graph.length_between(pairs).astype(np.float64)
-    change = (step * np.exp(-length / LENGTH_SCALE))[:, None]
-    total = np.repeat(weight.sum(axis=1)[:, None], len(pairs), axis=1)
-    degree = np.repeat(np.diff(weight.indptr)[:, None], len(pairs), axis=1)
-    for end in (u, v):
-        total[end, each] += change[:, 0]
-        degree[end, each] += step
-    lonely = (degree == 0)[:, :, None]
-    scale = np.where(lonely, 0, 1 / np.where(lonely, 1, total[:, :, None]))
-    level = np.repeat(x[:, None, :], len(pairs), axis=1)
-    levels = []
-    for _ in range(iterations):
-        mean = (weight @ level.reshape(len(x), -1)).reshape(level.shape)
-        mean[u, each] += change * level[v, each]
-        mean[v, each] += change * level[u, each]
-        level = (level + np.where(lonely, level, scale * mean)) / 2
-        levels.append(level)
-    return levels

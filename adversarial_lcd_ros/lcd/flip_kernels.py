@@ -15,14 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.lcd.kernels import (
-    LENGTH_SCALE,
-    MIN_COSINE,
-    NEIGHBOUR_WEIGHT,
-    Incidence,
-    dot,
-    vectorised,
-)
+from adversarial_lcd_ros.incidence import LENGTH_SCALE, Incidence, vectorised
+from adversarial_lcd_ros.lcd.kernels import MIN_COSINE, NEIGHBOUR_WEIGHT, dot
 
 _TINY = 1e-12
 
@@ -36,7 +30,7 @@ class Moments(NamedTuple):
     x0 : int8, (n, bits)
         Descriptor bits as +-1; zeros for objects.
     start, neighbour, weight
-        As ``kernels.incidence`` gives them.
+        As ``incidence`` gives them.
     product : float64, (n, n)
         x0(u) . x0(v).
     total : float64, (n,)

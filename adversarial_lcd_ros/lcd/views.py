@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
 from adversarial_lcd_ros.hamming import lanes, mutual
+from adversarial_lcd_ros.incidence import Incidence, incidence
 from adversarial_lcd_ros.lcd import kernels
 from adversarial_lcd_ros.lcd.kernels import MIN_COSINE
 
@@ -54,10 +55,10 @@ class View:
         return lanes(self.graph.descriptor[self.objects:])
 
     @cached_property
-    def incidence(self) -> kernels.Incidence:
-        """Neighbours and edge weights of every node; see ``kernels.incidence``."""
-        found: kernels.Incidence = kernels.incidence(
-            self.graph.edge, self.graph.edge_length, self.graph.node_count)
+    def incidence(self) -> Incidence:
+        """Neighbours and edge weights of every node; see ``incidence.incidence``."""
+        found: Incidence = incidence(self.graph.edge, self.graph.edge_length,
+                                     self.graph.node_count)
         return found
 
     def iterated(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
