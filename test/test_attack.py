@@ -138,6 +138,37 @@ def test_eigencentrality_is_an_eigenvector_of_the_largest_eigenvalue(graph):
     assert np.linalg.norm(x) == pytest.approx(1)
 
 
+@pytest.mark.parametrize('nodes', [100, 150, 400])
+def test_eigencentrality_of_larger_graphs_agrees_with_a_dense_solver(nodes):
+    rng = np.random.default_rng(nodes)
+    graph = make_graph(nodes).flip(flips_of(make_graph(nodes), rng, 3 * nodes))
+    near = eigencentrality(graph)
+    flipped = graph.flip(flips_of(graph, rng, 3))
+    for found, asked in ((near, graph), (eigencentrality(flipped), flipped),
+                         (eigencentrality(flipped, near), flipped)):
+        expected = np.abs(np.linalg.eigh(asked.adjacency.toarray())[1][:, -1])
+        assert found == pytest.approx(expected, abs=1e-10)
+
+
+def test_a_start_near_another_component_finds_the_one_that_leads_now():
+    small = [(a, b) for a in range(4) for b in range(a)]
+    large = [(a, b) for a in range(10, 15) for b in range(10, a)]
+    graph = make_graph(120, [*small, *large])
+    flipped = graph.flip([(10, b) for b in range(11, 15)] + [(3, b) for b in range(4, 9)])
+    found = eigencentrality(flipped, eigencentrality(graph))
+    assert found[:9].min() > 0.1
+    assert found[9:] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize('graph', [
+    make_graph(150, [(k, k + 1) for k in range(149)]),
+    make_graph(101, [(0, 1)]),
+])
+def test_eigencentrality_of_a_long_path_and_of_a_single_edge(graph):
+    expected = np.abs(np.linalg.eigh(graph.adjacency.toarray())[1][:, -1])
+    assert eigencentrality(graph) == pytest.approx(expected, abs=1e-7)
+
+
 def test_eigencentrality_of_a_large_ring_is_even_and_repeatable():
     ring = make_graph(200, [(k, (k + 1) % 200) for k in range(200)])
     assert eigencentrality(ring) == pytest.approx(200 ** -0.5, abs=1e-6)
