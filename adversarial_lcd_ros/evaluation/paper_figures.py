@@ -82,7 +82,7 @@ def query_curves(rows: Iterable[Row], setting: Mapping[str, object], ratio: floa
         return []
     at = np.unique(np.round(np.geomspace(1.0, largest, _POINTS)))
     return [Curve(*method, at, np.mean([_share_within(np.concatenate(parts), at)
-                                        for parts in of.values()], axis=0))
+                                        for _, parts in sorted(of.items())], axis=0))
             for method, of in sorted(spent.items())]
 
 
@@ -107,17 +107,8 @@ def target_map(cells: Sequence[Cell], ratio: float) -> TargetMap | None:
     attacks that have more than one. None without such.
 
     """
-    at_ratio = [cell for cell in cells if cell['ratio'] == ratio and cell['mode'] != 'pass']
-    if not at_ratio:
-        return None
-    counts = Counter(tuple(cell[name] for name in _SHARED) for cell in at_ratio)
-    shared = max(counts, key=lambda key: (counts[key], str(key)))
-    chosen = [cell for cell in at_ratio if tuple(cell[name] for name in _SHARED) == shared]
-    by_target = defaultdict(set)
-    for cell in chosen:
-        by_target[cell['target']].add(cell['sequence'])
-    common = set.intersection(*by_target.values())
-    chosen = [cell for cell in chosen if cell['sequence'] in common]
+    chosen = _comparable([cell for cell in cells
+                          if cell['ratio'] == ratio and cell['mode'] != 'pass'])
     methods = summarise_methods(chosen)
     there = {method['target'] for method in methods}
     targets = tuple(name for name in (*TARGETS, *sorted(there - set(TARGETS))) if name in there)
@@ -141,8 +132,20 @@ def target_map(cells: Sequence[Cell], ratio: float) -> TargetMap | None:
         return None
     declines = np.array([[values[title].get(target, np.nan) for target in targets]
                          for title in attacks])
-    return TargetMap(attacks, targets, declines, dict(zip(_SHARED, shared, strict=True)),
+    return TargetMap(attacks, targets, declines, {name: chosen[0][name] for name in _SHARED},
                      bool(moved))
+
+
+def _comparable(cells: Sequence[Cell]) -> list[Cell]:
+    # Of the commonest setting, on the sequences that all targets have.
+    counts = Counter(tuple(cell[name] for name in _SHARED) for cell in cells)
+    shared = max(counts, key=lambda key: (counts[key], str(key)), default=None)
+    chosen = [cell for cell in cells if tuple(cell[name] for name in _SHARED) == shared]
+    by_target: dict[str, set[str]] = defaultdict(set)
+    for cell in chosen:
+        by_target[cell['target']].add(cell['sequence'])
+    return [cell for cell in chosen
+            if all(cell['sequence'] in sequences for sequences in by_target.values())]
 
 
 def _attack(method: Cell) -> str:

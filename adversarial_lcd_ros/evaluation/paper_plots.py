@@ -102,6 +102,7 @@ def success_curves(curves: Sequence[Curve], width: float) -> bytes:
                  ylabel='right decisions\nturned over, %' if width == NARROW
                  else 'right decisions turned over, %')
         axes.xaxis.set_major_formatter('{x:,.0f}')
+        axes.xaxis.set_minor_formatter('')
         axes.grid(color=GRID, linewidth=0.6)
         _legend(axes, width)
         return svg(figure)

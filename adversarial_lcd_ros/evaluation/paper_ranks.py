@@ -9,7 +9,7 @@ both tests are scipy's, and a test holds the results equal to the library's wher
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -128,12 +128,7 @@ def rank_methods(declines: Mapping[str, Mapping[str, float]], alpha: float = ALP
     if len(names) < 2 or len(sequences) < 2:
         raise EvaluationError(f'{len(names)} methods over {len(sequences)} sequences: a ranking '
                               'needs at least two of each')
-    for name in names:
-        missing = [sequence for sequence in sequences if sequence not in declines[name]]
-        if missing:
-            raise EvaluationError(f'{name} has no figure for {", ".join(missing)}: a ranking '
-                                  'needs every method on every sequence')
-    table = np.array([[declines[name][sequence] for name in names] for sequence in sequences])
+    table = _table(declines, names, sequences)
     mean_rank = stats.rankdata(-table, axis=1).mean(axis=0)
     order = sorted(range(len(names)), key=lambda index: (mean_rank[index], names[index]))
     best = table[:, order[0]]
@@ -148,6 +143,16 @@ def rank_methods(declines: Mapping[str, Mapping[str, float]], alpha: float = ALP
                    p_value, _p_value(_unanimous(*table.shape)), alpha, difference,
                    _groups(methods, difference if p_value < alpha else math.inf,
                            told_apart=difference is None and p_value < alpha))
+
+
+def _table(declines: Mapping[str, Mapping[str, float]], names: Sequence[str],
+           sequences: Sequence[str]) -> NDArray[np.float64]:
+    for name in names:
+        missing = [sequence for sequence in sequences if sequence not in declines[name]]
+        if missing:
+            raise EvaluationError(f'{name} has no figure for {", ".join(missing)}: a ranking '
+                                  'needs every method on every sequence')
+    return np.array([[declines[name][sequence] for name in names] for sequence in sequences])
 
 
 def nemenyi_difference(methods: int, sequences: int, alpha: float = ALPHA) -> float:

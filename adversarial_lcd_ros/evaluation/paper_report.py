@@ -69,18 +69,29 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
     if not rows:
         raise EvaluationError(f'{folder}: no cell is finished yet; nothing can be reported')
     cells = summarise_cells(rows)
-    ratio = paper_views.main_ratio(cells)
     tables = [paper_views.surrogate_tables(cells), paper_views.perturbation_tables(cells),
               paper_views.budget_tables(cells)]
     write_exports(folder, rows, cells, [table for group in tables for table in group])
+    pictures = [(title, caption, data_uri(data, 'jpeg'))
+                for title, caption, data in read_pictures(folder)[:_PICTURES]]
+    path = folder / REPORT
+    write_text(path, load_template('paper.html.j2').render(
+        {**_values(rows, cells, tables), 'pictures': pictures}))
+    return path
+
+
+def _values(rows: Sequence[Row], cells: Sequence[Cell],
+            tables: Sequence[list[DeclineTable]]) -> dict[str, Any]:
+    ratio = paper_views.main_ratio(cells)
     methods = summarise_methods(cells)
     usual = _usual(cells)
     here = [method for method in methods if method['ratio'] == ratio]
-    values = {
-        'wording': wording, 'headline': paper_words.headline(methods, ratio), 'ratio': ratio,
+    return {
+        'wording': wording, 'count': _count, 'ratio': ratio,
+        'headline': paper_words.headline(methods, ratio),
         'best': paper_words.strongest(here, paper_words.main_target(here)),
         'warnings': paper_words.warnings(cells, tables[0] + tables[1]),
-        'cell_count': len(rows), 'duration': _duration(sum(row['duration_s'] for row in rows)),
+        'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
         'usual': ', '.join(words.format(usual[name]) for name, words in _WORDS.items()),
         'verdicts': [(name, paper_words.verdict(group[0])) for name, group in zip(
@@ -88,12 +99,7 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
         'surrogates': _blocks(tables[0]), 'perturbations': _blocks(tables[1]),
         'budgets': _blocks(tables[2]), 'notes': _notes(),
         'cells': _cells([cell for cell in cells if cell['ratio'] == ratio], usual),
-        'pictures': [(title, caption, data_uri(data, 'jpeg'))
-                     for title, caption, data in read_pictures(folder)[:_PICTURES]],
         'block_s': statistics.BLOCK_S, **_plots(rows, cells, tables, ratio)}
-    path = folder / REPORT
-    write_text(path, load_template('paper.html.j2').render(values))
-    return path
 
 
 def _plots(rows: Sequence[Row], cells: Sequence[Cell], tables: Sequence[list[DeclineTable]],
@@ -224,13 +230,15 @@ def _figures(summary: Cell) -> dict[str, str]:
 
 
 def _counts(summary: Cell) -> dict[str, str]:
-    return {'suppressed': f'{wording.mean_count(summary["suppressed"])} of '
-                          f'{wording.mean_count(summary["found_clean"])}',
-            'invented': f'{wording.mean_count(summary["invented"])} of '
-                        f'{wording.mean_count(summary["silent_clean"])}',
-            'unattackable': f'{summary["unattackable"]:.0f} of {summary["frames"]:.0f}',
-            'edits': wording.mean_count(summary['edits_mean']),
-            'queries': wording.mean_count(summary['queries_mean'])}
+    return {'suppressed': f'{_count(summary["suppressed"])} of {_count(summary["found_clean"])}',
+            'invented': f'{_count(summary["invented"])} of {_count(summary["silent_clean"])}',
+            'unattackable': f'{_count(summary["unattackable"])} of {_count(summary["frames"])}',
+            'edits': _count(summary['edits_mean']), 'queries': _count(summary['queries_mean'])}
+
+
+def _count(value: float) -> str:
+    # A mean of counts: without decimals where it is a whole number, as with a single seed.
+    return f'{value:,.0f}' if value == round(value) else wording.mean_count(value)
 
 
 def _title(summary: Cell) -> str:

@@ -95,10 +95,10 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
     -------
     list of dict
         ``ATTACK``; ``sequences`` (names, those with a decline), ``decline_pp`` (mean),
-        ``ci95`` (Student's t over the sequences, None below two: resampling so few gives
-        intervals that are too narrow), ``least_pp``, ``most_pp``, ``accuracy_clean``,
-        ``accuracy_attacked``, ``edits_mean``, ``queries_mean``, ``share_of_optimum`` (of the
-        means, over the sequences that have both).
+        ``ci95`` (Student's t over the sequences, cut at the possible -100 and 100, None below
+        two: resampling so few gives intervals that are too narrow), ``least_pp``, ``most_pp``,
+        ``share_of_optimum`` (of the means, over the sequences that have both); means of the
+        accuracies, of edits and queries; sums of the counts.
 
     """
     groups: dict[tuple[Hashable, ...], list[Cell]] = defaultdict(list)
@@ -239,7 +239,7 @@ def _over_sequences(cells: Sequence[Cell], best: Mapping[tuple[Hashable, ...], f
     taken, possible = (math.fsum(column) for column in zip(*both, strict=True)) if both else (0, 0)
     return {
         'sequences': [cell['sequence'] for cell in cells], 'decline_pp': mean,
-        'ci95': None if half is None else (mean - half, mean + half),
+        'ci95': None if half is None else (max(mean - half, -100.0), min(mean + half, 100.0)),
         'least_pp': float(declines.min()), 'most_pp': float(declines.max()),
         'seeds': min(cell['seeds'] for cell in cells),
         'share_of_optimum': taken / possible if possible > 0 else None,

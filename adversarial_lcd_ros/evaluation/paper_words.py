@@ -62,7 +62,8 @@ def headline(methods: Sequence[Cell], ratio: float) -> str:
     if best['decline_pp'] < _TIE_PP:
         return (f'No black-box attack lowered the balanced accuracy of {target} on {over} at '
                 f'r = {ratio:g}; the strongest was {title}, {accuracy}.')
-    doubt = (' Over sequences this is within chance.' if bounds and bounds[0] <= 0 else
+    doubt = (' So few sequences leave open whether it holds on others.'
+             if bounds and bounds[0] <= 0 else
              ' One sequence says nothing about others.' if bounds is None else '')
     return (f'At r = {ratio:g} the strongest black-box attack on target {target} ({title}) took '
             f'{wording.points(best["decline_pp"])} points of balanced accuracy on average over '
@@ -197,7 +198,7 @@ def _frames(cells: Sequence[Cell]) -> list[str]:
             kind = 'loops' if not positives else 'new places'
             texts.append(f'{sequence} has no {kind}: no balanced accuracy, no decline.')
         elif min(positives, negatives) < _FEW_FRAMES:
-            texts.append(f'{sequence} has only {positives:g} frames with a loop and '
-                         f'{negatives:g} at a new place: its interval is wide, or too narrow if '
-                         'they lie in a few blocks of time.')
+            texts.append(f'{sequence} has {positives:g} frames with a loop and {negatives:g} at '
+                         f'a new place: with fewer than {_FEW_FRAMES} of one kind its interval is '
+                         'wide, or too narrow if they lie in a few blocks of time.')
     return texts
