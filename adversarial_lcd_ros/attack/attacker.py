@@ -103,11 +103,16 @@ class Attacker:
             OracleSilentError, which ends the attack on this graph.
 
         """
-        result = self._attack(graph, ask)
-        self._search.observe(graph)
+        result = self.attack(graph, ask)
+        self.observe(graph)
         return result
 
-    def _attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
+    def observe(self, graph: MultiTierGraph) -> None:
+        """Remember a graph that goes by."""
+        self._search.observe(graph)
+
+    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
+        """Return what ``process`` returns, without remembering the graph."""
         edits = edit_budget(graph.node_count, self.config.ratio)
         queries = min(edits * self.config.queries_per_edit, self.config.max_queries)
         if self.config.mode == 'pass':
