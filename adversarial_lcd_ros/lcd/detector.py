@@ -81,9 +81,13 @@ class LoopClosureDetector:
     def detect(self, graph: MultiTierGraph) -> LoopClosure:
         """Judge a graph, then remember it as a keyframe."""
         decision = self.judge(graph)
+        self.remember(graph)
+        return decision
+
+    def remember(self, graph: MultiTierGraph) -> None:
+        """Store a graph as a keyframe without judging it, while there is room."""
         if len(self._database) < self.config.max_keyframes:
             self._database.add(graph)
-        return decision
 
     def answer(self, query: LcdQuery) -> LcdAnswer:
         """Tell what the decision on a graph would be; remembers nothing."""
