@@ -187,6 +187,10 @@ class AttackConfig(Config):
         'pooled', 'Features of a perturbed graph: pooled over its nodes, which carries over '
         'between frames, or node by node as in Eq. (5) (query mode only).',
         choices=('pooled', 'per_graph'))
+    echoes: str = setting(
+        'both', 'Recall: edges that it replays or erases, those between features or those at '
+        'objects; both: the answers tell which, and without queries features.',
+        choices=('both', 'features', 'objects'))
     edits: str = setting(
         'both', 'Which flips are allowed: add edges, delete edges, or both.',
         choices=('both', 'add', 'delete'))

@@ -413,11 +413,11 @@ def test_recall_knows_nothing_of_the_last_eight_seconds():
     assert (result.status, result.reason) == ('failure', 'no graph left to recall')
 
 
-def test_recall_without_queries(surrogate_data):
-    config = AttackConfig(perturbation='recall', mode='surrogate', ratio=1e-3,
-                          surrogate_data=str(surrogate_data))
-    attacker = Attacker(config)
+def test_recall_without_queries_adds_what_is_missing():
+    attacker = Attacker(AttackConfig(perturbation='recall', mode='surrogate', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
-    detector = SecretDetector(GRAPH)
-    result = attacker.process(later(GRAPH, 20), detector)
-    assert (len(result.flips), result.queries, detector.asked) == (3, 0, [])
+    missing = [[10, 11], [30, 31], [40, 41]]
+    now = later(GRAPH.flip(missing), 20)
+    detector = SecretDetector(now)
+    result = attacker.process(now, detector)
+    assert (result.flips.tolist(), result.queries, detector.asked) == (missing, 0, [])

@@ -80,7 +80,7 @@ class Attacker:
         self.config = config or AttackConfig()
         self._search: Search
         if self.config.perturbation == 'recall':
-            self._search = Recall(self.config, self._data)
+            self._search = Recall(self.config)
         elif self.config.mode == 'surrogate' and self.config.surrogate == 'none':
             raise ConfigError('mode "surrogate" needs a surrogate: found surrogate "none"')
         else:
@@ -104,7 +104,7 @@ class Attacker:
 
         """
         result = self.attack(graph, ask)
-        self.observe(graph)
+        self.observe(result.perturbed)
         return result
 
     def observe(self, graph: MultiTierGraph) -> None:
@@ -137,14 +137,11 @@ class Attacker:
         except OracleSilentError:
             return AttackResult(graph, graph, 'skipped', 'no answer', edits, queries, oracle.used)
         before = hunt.loss
-        if hunt.hopeless:
-            reason = 'nothing to compare with'
-        else:
-            try:
-                reason = self._search.hunt(hunt, rng)
-            except OracleSilentError:
-                reason = 'no answer'
-            except BudgetError:  # the deadline passed since the search looked
-                reason = oracle.exhausted
+        try:
+            reason = self._search.hunt(hunt, rng)
+        except OracleSilentError:
+            reason = 'no answer'
+        except BudgetError:  # the deadline passed since the search looked
+            reason = oracle.exhausted
         return AttackResult(graph, hunt.best, 'success' if hunt.succeeded else 'failure', reason,
                             edits, queries, oracle.used, before, hunt.loss, tuple(hunt.trace))

@@ -7,13 +7,17 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linear_sum_assignment
 
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.hamming import lanes, mutual
 from adversarial_lcd_ros.keyframes import Database
 
 MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76
-RECALLED = 5
+RECALLED = 10
+CACHED = 256
 
 
 @dataclass(frozen=True)
@@ -24,37 +28,46 @@ class Echo:
     Attributes
     ----------
     pairs : int64, (k, 2)
-        Pairs of the present graph, source < target, whose like-looking features are joined by
-        an edge in the past one.
+        Pairs of the present graph, source < target, whose like-looking nodes are joined by an
+        edge in the past one.
     weight : float64, (k,)
-        How much alike the features at both ends look, 0 to 1.
+        How much alike the features at their ends look, 0 to 1; objects of a class are alike.
+    at_object : bool, (k,)
+        One of the ends is an object.
 
     """
 
     pairs: NDArray[np.int64]
     weight: NDArray[np.float64]
+    at_object: NDArray[np.bool_]
 
 
 class Memory:
     """
-    All graphs that passed the man in the middle, before he touched them.
+    All graphs that passed the man in the middle, as he forwarded them: the detector's map.
 
-    Nothing here comes from the detector. Whether a detector remembers for longer or for shorter
-    than the eight seconds below is not known to him either.
+    He does not know how old a graph must be for the detector to compare with it. He assumes
+    eight seconds until an answer tells him better (``too_young``).
     """
 
     def __init__(self) -> None:
         self._database = Database()
-        self._signs = lru_cache(64)(lambda index: _signs(self._database[index]))
+        self._gap_ns = MIN_GAP_NS
+        self._lanes = lru_cache(CACHED)(lambda index: _feature_lanes(self._database[index]))
 
     def add(self, graph: MultiTierGraph) -> None:
-        """Remember a clean graph."""
+        """Remember a graph as it was forwarded."""
         self._database.add(graph)
+
+    def too_young(self, stamp_ns: int) -> None:
+        """Learn that at this time the detector compared with nothing, not even the oldest."""
+        if len(self._database):
+            self._gap_ns = stamp_ns - self._database[0].stamp_ns
 
     def similar(self, graph: MultiTierGraph, count: int = RECALLED) -> list[tuple[int, float]]:
         """Return the graphs of the past that share most visual words, as (index, score)."""
         score = self._database.scores(graph)
-        score[~self._database.admissible(graph.stamp_ns, MIN_GAP_NS)] = -1
+        score[~self._database.admissible(graph.stamp_ns, self._gap_ns)] = -1
         best = np.argsort(-score, kind='stable')[:count]
         return [(int(index), float(score[index])) for index in best if score[index] >= 0]
 
@@ -65,30 +78,34 @@ class Memory:
     def echo(self, graph: MultiTierGraph, index: int) -> Echo:
         """Return which edges of a past graph the present one might repeat."""
         past = self._database[index]
+        # For each node of the past graph: the present one that looks like it, and how much.
         node = np.full(past.node_count, -1, np.int64)
         alike = np.zeros(past.node_count)
-        query, reference, weight = _match(_signs(graph), self._signs(index))
-        node[reference + past.object_count] = query + graph.object_count
-        alike[reference + past.object_count] = weight
+        present, matched, distance = mutual(_feature_lanes(graph), self._lanes(index), MAX_HAMMING)
+        node[matched + past.object_count] = present + graph.object_count
+        alike[matched + past.object_count] = 1 - distance / (MAX_HAMMING + 1.0)
+        rows, columns = _match_objects(graph, past, node, alike)
+        node[columns], alike[columns] = rows, 1
         ends = past.edge.astype(np.int64)
         ends = ends[(node[ends] >= 0).all(axis=1)]
-        return Echo(np.sort(node[ends], axis=1), np.sqrt(alike[ends].prod(axis=1)))
+        return Echo(np.sort(node[ends], axis=1), np.sqrt(alike[ends].prod(axis=1)),
+                    ends[:, 0] < past.object_count)
 
 
-def _signs(graph: MultiTierGraph) -> NDArray[np.float32]:
-    bits = np.unpackbits(graph.descriptor[graph.object_count:], axis=1)
-    return 2 * bits.astype(np.float32) - 1
+def _feature_lanes(graph: MultiTierGraph) -> NDArray[np.uint64]:
+    return lanes(graph.descriptor[graph.object_count:])
 
 
-def _match(query: NDArray[np.float32], reference: NDArray[np.float32]
-           ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return features that are each other's nearest in Hamming distance, and how near, 0 to 1."""
-    if not len(query) or not len(reference):
-        none = np.zeros(0, np.int64)
-        return none, none, np.zeros(0)
-    distance = (256 - query @ reference.T) / 2
-    forward = distance.argmin(axis=1)
-    rows = np.arange(len(query))
-    best = distance[rows, forward]
-    kept = np.flatnonzero((distance.argmin(axis=0)[forward] == rows) & (best <= MAX_HAMMING))
-    return kept, forward[kept], 1 - best[kept] / (MAX_HAMMING + 1.0)
+def _match_objects(graph: MultiTierGraph, past: MultiTierGraph, node: NDArray[np.int64],
+                   alike: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return objects of one class in both graphs, those together that hold like features."""
+    objects, olds = graph.object_count, past.object_count
+    source, target = past.edge.astype(np.int64).T
+    held = (source < olds) & (node[target] >= 0)
+    holds = sparse.csr_array((alike[target[held]], (node[target[held]], source[held])),
+                             shape=(graph.node_count, olds))
+    common = (graph.adjacency[:objects] @ holds).toarray()
+    same = graph.label[:objects, None] == past.label[None, :olds]
+    rows, columns = linear_sum_assignment(np.where(same, 1 + common, 0), maximize=True)
+    kept = same[rows, columns]
+    return rows[kept], columns[kept]

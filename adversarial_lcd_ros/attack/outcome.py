@@ -57,6 +57,8 @@ class Hunt:
     @property
     def over(self) -> str:
         """Why the hunt ends; empty while it goes on."""
+        if self.hopeless:
+            return 'nothing to compare with'
         return 'decision changed' if self.succeeded else self.oracle.exhausted
 
     def ask(self, graph: MultiTierGraph) -> tuple[float, bool]:
@@ -85,5 +87,5 @@ class Search(Protocol):
         ...
 
     def observe(self, graph: MultiTierGraph) -> None:
-        """Remember a clean graph; called with each, after it was attacked."""
+        """Remember a graph as it was forwarded; called with each."""
         ...

@@ -83,7 +83,7 @@ class Stepwise:
                               Kernel(self._config.gamma, self._config.sigma))
 
     def observe(self, graph: MultiTierGraph) -> None:
-        """Remember a clean graph's words, where no query tells what the detector sees in it."""
+        """Remember a graph's words, where no query tells what the detector sees in it."""
         if self._trained:
             self._memory.add(graph)
 
