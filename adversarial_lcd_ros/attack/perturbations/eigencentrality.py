@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +19,13 @@ TIE_DECIMALS = 9
 TOLERANCE = 1e-12
 START_SHARE = 1e-3
 RESTARTS = 20
+
+
+@lru_cache(16)
+def _start(count: int) -> NDArray[np.float64]:
+    # Without symmetry: a start that lacks a part of the eigenvector would never find it.
+    start: NDArray[np.float64] = np.random.default_rng(0).uniform(0.5, 1.5, count) / count ** 0.5
+    return start
 
 
 def eigencentrality(graph: MultiTierGraph, near: NDArray[np.float64] | None = None
@@ -46,11 +54,8 @@ def eigencentrality(graph: MultiTierGraph, near: NDArray[np.float64] | None = No
         shared = np.abs(space @ space.sum(axis=0))
         x: NDArray[np.float64] = shared / np.linalg.norm(shared)
         return x
-    # Without symmetry: a start that lacks a part of the eigenvector would never find it. For the
-    # same reason something of it is added to what is near: another component may lead now.
-    start = np.random.default_rng(0).uniform(0.5, 1.5, count)
-    if near is not None:
-        start = near + START_SHARE * start / np.sqrt(count)
+    # Something of an arbitrary start is added to what is near: another component may lead now.
+    start = _start(count) if near is None else near + START_SHARE * _start(count)
     for _ in range(RESTARTS):
         start, residual = leading(graph.edge, start, TOLERANCE)
         if residual <= 10 * TOLERANCE:

@@ -1,0 +1,106 @@
+"""What benchmarks share: real graphs, and a record of each against its rival."""
+
+from datetime import datetime, timezone
+from functools import cache
+import json
+import os
+from pathlib import Path
+import platform
+import statistics
+import time
+
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.vision.builder import GraphBuilder
+
+ROOT = Path(__file__).parents[1]
+RESULTS = Path(__file__).with_name('results.json')
+MACHINE = Path(__file__).with_name('machine.json')
+SECONDS_EACH = 1.0
+LEAST_ROUNDS, MOST_ROUNDS = 3, 50
+_rows = []
+
+
+def _rounds(function):
+    """Warm up, and return how often a function fits into the time it gets."""
+    function()
+    started = time.perf_counter()
+    function()
+    once = time.perf_counter() - started
+    return round(min(max(SECONDS_EACH / max(once, 1e-9), LEAST_ROUNDS), MOST_ROUNDS))
+
+
+def _median_s(function):
+    times = []
+    for _ in range(_rounds(function)):
+        started = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - started)
+    return statistics.median(times)
+
+
+@pytest.fixture
+def record(benchmark):
+    """
+    Return a function that times ours and a rival in one run and keeps the row.
+
+    Its parameters: ``name`` and ``size`` of the row; ``ours`` and ``rival_fn``, both called
+    without arguments; ``rival``, who that is; ``mark``, how many times faster than the rival ours
+    shall be, or with ``higher_is_better=False`` the most seconds that ours shall take;
+    ``ours_units`` and ``rival_units``, how many things a call does: times are for one of them.
+    """
+    def run(name, size, ours, rival, rival_fn, mark=None, *, higher_is_better=True,
+            ours_units=1, rival_units=1):
+        if benchmark.stats is None:  # once a test: its table shows ours
+            benchmark.pedantic(ours, rounds=_rounds(ours))
+            ours_s = benchmark.stats.stats.median / ours_units
+        else:
+            ours_s = _median_s(ours) / ours_units
+        rival_s = _median_s(rival_fn) / rival_units
+        reached = rival_s / ours_s if higher_is_better else ours_s
+        met = None if mark is None else bool(
+            reached >= mark if higher_is_better else reached <= mark)
+        _rows.append({'name': name, 'size': size, 'ours_s': ours_s, 'rival': rival,
+                      'rival_s': rival_s, 'ratio': rival_s / ours_s, 'mark': mark, 'met': met})
+        return _rows[-1]
+    return run
+
+
+def _machine():
+    model = next((line.split(':', 1)[1].strip()
+                  for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+                  if line.startswith('model name')), platform.processor())
+    return {'processor': model, 'cores': len(os.sched_getaffinity(0)),
+            'system': platform.platform(), 'python': platform.python_version(),
+            'numpy': np.__version__,
+            'time': datetime.now(timezone.utc).isoformat(timespec='seconds')}
+
+
+def pytest_sessionfinish(session):
+    """Write the rows of this run, in place of earlier ones of the same name, size and rival."""
+    if not _rows:
+        return
+    kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.is_file() else []
+    fresh = {(row['name'], row['size'], row['rival']) for row in _rows}
+    rows = [row for row in kept if (row['name'], row['size'], row['rival']) not in fresh] + _rows
+    for path, content in ((RESULTS, rows), (MACHINE, _machine())):
+        path.write_text(json.dumps(content, indent=2) + '\n', encoding='utf-8')
+
+
+@pytest.fixture(scope='session')
+def tour_graphs():
+    """Return a function: graphs of every 9th frame of the embedded tour, by features a graph."""
+    sequence = open_sequence(str(ROOT / 'bags' / 'flat_tour'))
+
+    @cache
+    def build(features):
+        builder = GraphBuilder(BuilderConfig(features=features))
+        try:
+            return [builder.build(frame.image(), frame.stamp_ns, sequence.name, number)
+                    for number, frame in enumerate(sequence.frames(stride=9))]
+        finally:
+            builder.close()
+    return build
