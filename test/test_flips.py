@@ -74,5 +74,17 @@ def test_a_scorer_goes_on_with_flipped_graphs(make_detector):
         by_judging(detector, flipped, pairs), abs=1e-9)
 
 
+def test_step_after_step_the_scores_are_those_of_a_fresh_scorer(make_detector):
+    graph = replace(make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3),
+                    stamp_ns=10**12)
+    detector = make_detector([graph.flip([(3, 4)]), make_graph(20, objects=3)])
+    scorer = FlipScorer(detector, graph)
+    for pair in [(7, 8), (0, 5), (1, 12), (9, 10), (0, 9)]:
+        graph = graph.flip([pair])
+        assert scorer.logits(graph) == pytest.approx(flip_logits(detector, graph), abs=1e-12)
+        if pair == (1, 12):  # other pairs in between
+            scorer.logits(graph.flip([(2, 9)]), [(3, 4)])
+
+
 def test_without_a_candidate_no_flip_makes_a_loop(make_detector):
     assert (flip_logits(make_detector([]), make_graph()) == -np.inf).all()

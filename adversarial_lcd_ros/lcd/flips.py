@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -27,13 +28,19 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True)
 class _Flips:
-    """Single flips of a graph: (k, 2) pairs, which of them are edges, and their lengths."""
+    """
+    Single flips of a graph: (k, 2) pairs, which of them are edges, and their lengths.
+
+    ``changed`` holds the nodes whose edges differ from those of the graph before, if that was
+    asked about the same pairs; else None.
+    """
 
     view: View
     pairs: NDArray[np.int64]
     present: NDArray[np.bool_]
     length: NDArray[np.float32]
     moments: Moments
+    changed: NDArray[np.int64] | None
 
 
 class _Channel(Protocol):
@@ -81,6 +88,7 @@ class _Neighbourhoods:
         self._product = nodes.base.x0.astype(np.float64) @ self._feature.T.astype(np.float64)
         self._share = share(nodes.average, nodes.base.features, compared.features)[
             :, compared.match_owner].T.copy()
+        self._change = np.zeros((0, len(nodes.average)))
 
     def after(self, flips: _Flips) -> NDArray[np.float64]:
         everything = np.arange(flips.view.graph.node_count)
@@ -89,11 +97,17 @@ class _Neighbourhoods:
                                    self._feature, score)
         near = flip_kernels.near_products(everything, self._start[:-1], self._start[1:],
                                           flips.moments, self._product)
-        change: NDArray[np.float64] = flip_kernels.match_changes(
-            flips.pairs, flips.present, flips.length, flips.moments, self._start, self._feature,
-            self._product, near, score, self._share)
+        if flips.changed is None:
+            stale = np.arange(len(flips.pairs))
+            self._change = np.zeros((len(flips.pairs), self._share.shape[1]))
+        else:  # what a flip changes hangs on the edges of its ends alone
+            touched = np.isin(everything, flips.changed)
+            stale = np.flatnonzero(touched[flips.pairs[:, 0]] | touched[flips.pairs[:, 1]])
+        self._change[stale] = flip_kernels.match_changes(
+            flips.pairs[stale], flips.present[stale], flips.length[stale], flips.moments,
+            self._start, self._feature, self._product, near, score, self._share)
         base = score @ self._share
-        return _settled(base + change, base)
+        return _settled(base + self._change, base)
 
 
 def _settled(total: NDArray[np.float64], base: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,9 +121,15 @@ class _Objects:
     def __init__(self, nodes: QueryNodes) -> None:
         self._nodes = nodes
         self._feature = nodes.comparison.object_x1
+        self._scores = np.zeros((0, len(nodes.average)))
         self._product = nodes.base.x0.astype(np.float64) @ self._feature.T.astype(np.float64)
 
     def after(self, flips: _Flips) -> NDArray[np.float64]:
+        if flips.changed is None or (flips.changed < flips.view.objects).any():
+            self._scores = self._all(flips)
+        return self._scores
+
+    def _all(self, flips: _Flips) -> NDArray[np.float64]:
         nodes, view = self._nodes.comparison, flips.view
         cosine = object_cosines(view, nodes)
         total = np.array([assign_objects(cosine[:, nodes.objects_of(place)])[2].sum()
@@ -188,6 +208,9 @@ class FlipScorer:
     """
     Exact log odds of single flips of graphs that share their nodes.
 
+    All flips of a graph are scored the sooner the fewer edges differ from the graph before: the
+    steps of a greedy search cost half of the first.
+
     Attributes
     ----------
     detector : LoopClosureDetector
@@ -199,6 +222,7 @@ class FlipScorer:
         self.detector = detector
         self._nodes = detector.query_nodes(graph)
         self._target = detector.config.target
+        self._before: MultiTierGraph | None = None
         if self._nodes.candidates:
             rows = self._nodes.base.x0.astype(np.float64)
             self._product = rows @ rows.T
@@ -217,18 +241,37 @@ class FlipScorer:
             Default: all n (n - 1) / 2, in the order of ``numpy.triu_indices``.
 
         """
-        ends = (np.stack(np.triu_indices(graph.node_count, 1), axis=1) if pairs is None
+        ends = (None if pairs is None
                 else np.sort(np.asarray(pairs, np.int64).reshape(-1, 2), axis=1))
         if not self._nodes.candidates:
-            return np.full(len(ends), -np.inf)
-        view = View(graph, self._nodes.base)
-        flips = _Flips(view, ends, graph.has_edges(ends), graph.length_between(ends),
-                       flip_kernels.moments(view.x0, view.incidence, self._product))
+            every = graph.node_count * (graph.node_count - 1) // 2
+            return np.full(every if ends is None else len(ends), -np.inf)
+        flips = self._flips(graph, ends)
         if not self._channels:
             return self._judged(flips)
         scores = np.stack([channel.after(flips) for channel in self._channels], axis=2)
         best: NDArray[np.float64] = self.detector.decision.logit(scores).max(axis=1)
         return best
+
+    def _flips(self, graph: MultiTierGraph, pairs: NDArray[np.int64] | None) -> _Flips:
+        view = View(graph, self._nodes.base)
+        moments = flip_kernels.moments(view.x0, view.incidence, self._product)
+        before, self._before = self._before, graph if pairs is None else None
+        if pairs is not None:
+            return _Flips(view, pairs, graph.has_edges(pairs), graph.length_between(pairs),
+                          moments, None)
+        ends, length = self._everything
+        changed = None if before is None else kernels.changed_nodes(
+            before.edge_key, before.edge_length, graph.edge_key, graph.edge_length,
+            graph.node_count)
+        return _Flips(view, ends, graph.has_edges(ends), length, moments, changed)
+
+    @cached_property
+    def _everything(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """All pairs of nodes, and their lengths."""
+        graph = self._nodes.base.graph
+        ends = np.stack(np.triu_indices(graph.node_count, 1), axis=1)
+        return ends, graph.length_between(ends)
 
     def _judged(self, flips: _Flips) -> NDArray[np.float64]:
         """Return the log odds after each flip by making those that the target can feel."""
