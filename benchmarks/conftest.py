@@ -60,13 +60,31 @@ def record(benchmark):
         else:
             ours_s = _median_s(ours) / ours_units
         rival_s = _median_s(rival_fn) / rival_units
-        reached = rival_s / ours_s if higher_is_better else ours_s
-        met = None if mark is None else bool(
-            reached >= mark if higher_is_better else reached <= mark)
-        _rows.append({'name': name, 'size': size, 'ours_s': ours_s, 'rival': rival,
-                      'rival_s': rival_s, 'ratio': rival_s / ours_s, 'mark': mark, 'met': met})
-        return _rows[-1]
+        return _keep(name, size, ours_s, rival, rival_s, mark, higher_is_better)
     return run
+
+
+@pytest.fixture
+def measured():
+    """
+    Return a function that keeps a row of times measured otherwise: across processes, or by stage.
+
+    Its parameters: ``name``, ``size``, ``ours_s``, ``rival``, ``rival_s`` (None without a rival)
+    and ``mark``, the most seconds that ours shall take; of a rate, those of one thing.
+    """
+    def keep(name, size, ours_s, rival=None, rival_s=None, mark=None):
+        return _keep(name, size, ours_s, rival, rival_s, mark, higher_is_better=False)
+    return keep
+
+
+def _keep(name, size, ours_s, rival, rival_s, mark, higher_is_better):
+    ratio = None if rival_s is None else rival_s / ours_s
+    met = None
+    if mark is not None:
+        met = bool(ratio >= mark if higher_is_better else ours_s <= mark)
+    _rows.append({'name': name, 'size': size, 'ours_s': float(ours_s), 'rival': rival,
+                  'rival_s': rival_s, 'ratio': ratio, 'mark': mark, 'met': met})
+    return _rows[-1]
 
 
 def _machine():
@@ -80,10 +98,12 @@ def _machine():
 
 
 def pytest_sessionfinish(session):
-    """Write the rows of this run, in place of earlier ones of the same name, size and rival."""
+    """Write the rows of a whole run; those of a part of it in place of the earlier ones."""
     if not _rows:
         return
-    kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.is_file() else []
+    whole = session.config.args == ['benchmarks'] and not session.config.option.keyword
+    kept = (json.loads(RESULTS.read_text(encoding='utf-8'))
+            if RESULTS.is_file() and not whole else [])
     fresh = {(row['name'], row['size'], row['rival']) for row in _rows}
     rows = [row for row in kept if (row['name'], row['size'], row['rival']) not in fresh] + _rows
     for path, content in ((RESULTS, rows), (MACHINE, _machine())):
