@@ -227,7 +227,8 @@ class MultiTierGraph:
             raise GraphError(f'flip of node {int(ends.max())}: the graph has {self.node_count}')
         if np.any(ends[:, 0] == ends[:, 1]):
             raise GraphError('flip of a node with itself: self-loops are not edges')
-        key: NDArray[np.int64] = ends.min(1) * self.node_count + ends.max(1)
+        source, target = np.minimum(ends[:, 0], ends[:, 1]), np.maximum(ends[:, 0], ends[:, 1])
+        key: NDArray[np.int64] = source * self.node_count + target
         return key
 
     def flip(self, pairs: ArrayLike) -> MultiTierGraph:

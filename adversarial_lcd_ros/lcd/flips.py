@@ -250,7 +250,9 @@ class FlipScorer:
         if not self._channels:
             return self._judged(flips)
         scores = np.stack([channel.after(flips) for channel in self._channels], axis=2)
-        best: NDArray[np.float64] = self.detector.decision.logit(scores).max(axis=1)
+        logits = self.detector.decision.logit(scores)
+        # Along few candidates numpy's maximum is slow: turned around it takes a tenth.
+        best: NDArray[np.float64] = np.ascontiguousarray(logits.T).max(axis=0)
         return best
 
     def _flips(self, graph: MultiTierGraph, pairs: NDArray[np.int64] | None) -> _Flips:
