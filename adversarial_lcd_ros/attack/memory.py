@@ -16,7 +16,6 @@ from adversarial_lcd_ros.keyframes import Database
 
 MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76
-RECALLED = 10
 CACHED = 256
 
 
@@ -64,7 +63,7 @@ class Memory:
         if len(self._database):
             self._gap_ns = stamp_ns - self._database[0].stamp_ns
 
-    def similar(self, graph: MultiTierGraph, count: int = RECALLED) -> list[tuple[int, float]]:
+    def similar(self, graph: MultiTierGraph, count: int) -> list[tuple[int, float]]:
         """Return the graphs of the past that share most visual words, as (index, score)."""
         score = self._database.scores(graph)
         score[~self._database.admissible(graph.stamp_ns, self._gap_ns)] = -1

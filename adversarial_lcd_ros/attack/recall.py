@@ -15,6 +15,8 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 FAMILIES = ('features', 'objects')
 LEARNING_RATE = 0.1
 RESERVE = 2
+RECALLED = 10
+RECALLED_UNASKED = 5
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ class Recall:
         Unasked, he cannot tell a loop from a new place; but few loops can be suppressed at all,
         and one that is made clearer is none the worse for him.
         """
-        plan = next(iter(self._plans(graph, edit_budget, is_loop=False)), None)
+        plan = next(iter(self._plans(graph, edit_budget, is_loop=False,
+                                     recalled=RECALLED_UNASKED)), None)
         return graph if plan is None else graph.flip(plan.pairs[:edit_budget])
 
     def _learn(self, is_loop: bool, before: float, tried: list[tuple[float, _Plan]]) -> None:
@@ -92,15 +95,17 @@ class Recall:
             known = self._gain.get((is_loop, family), 0.0)
             self._gain[is_loop, family] = known + LEARNING_RATE * (gain - known)
 
-    def _plans(self, graph: MultiTierGraph, edit_budget: int, is_loop: bool) -> list[_Plan]:
+    def _plans(self, graph: MultiTierGraph, edit_budget: int, is_loop: bool,
+               recalled: int = RECALLED) -> list[_Plan]:
         """Return sets of flips, the most promising first."""
         if self._edits == ('add' if is_loop else 'delete'):
             return []
-        recalled = [self._memory.neighbours(index) for index, _ in self._memory.similar(graph)]
-        echoes = {index: self._memory.echo(graph, index) for near in recalled for index in near}
+        windows = [self._memory.neighbours(index)
+                   for index, _ in self._memory.similar(graph, recalled)]
+        echoes = {index: self._memory.echo(graph, index) for near in windows for index in near}
         # A loop has to be broken with all graphs at once, and made with one.
         together = ([list(echoes.values())] if is_loop
-                    else [[echoes[index] for index in near] for near in recalled])
+                    else [[echoes[index] for index in near] for near in windows])
         plans = [_plan(graph, echo, edit_budget, family, delete=is_loop)
                  for family in self._families for echo in together if echo]
         return sorted((plan for plan in plans if len(plan.pairs)),
