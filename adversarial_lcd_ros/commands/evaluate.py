@@ -1,4 +1,4 @@
-"""adversarial-lcd evaluate and demo: a bag replayed clean and attacked."""
+"""adversarial-lcd evaluate and demo: a bag replayed clean and attacked, or a sweep."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
+from adversarial_lcd_ros.commands import sweep
 from adversarial_lcd_ros.commands.common import TABLE_WIDTH, Commands, add_command, tell
 from adversarial_lcd_ros.config import (
     AttackConfig,
@@ -15,6 +16,7 @@ from adversarial_lcd_ros.config import (
     LcdConfig,
     ReplayConfig,
 )
+from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import add_config_options, chosen_settings, config_from_options
 
 DEMO_BAG = 'bags/flat_tour'
@@ -29,10 +31,14 @@ def add(commands: Commands) -> None:
     """Declare the command."""
     parser = add_command(
         commands, 'evaluate',
-        'Replay a bag clean and attacked, and report what the attack cost.', _evaluate)
-    parser.add_argument('bag', type=Path, help='bag with ground truth, made by "import" or '
-                        '"build"')
-    _add_evaluation_options(parser, 'BAG [OPTIONS]')
+        'Replay a bag clean and attacked, or run a recipe of many attacks over sequences, and '
+        'report what the attacks cost.', _evaluate)
+    parser.add_argument('sources', nargs='+', metavar='SEQUENCE',
+                        help='bag with ground truth, made by "import" or "build"; with a recipe '
+                        'of the protocol "frames" any number of bags or folders, also parts of '
+                        'them (PATH@FROM:TO, PATH@0.5:1 is the second half)')
+    _add_evaluation_options(parser, 'SEQUENCE [SEQUENCE ...] [OPTIONS]')
+    sweep.add_options(parser)
 
 
 def add_demo(commands: Commands) -> None:
@@ -47,7 +53,9 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
     parser.usage = f'{parser.prog} {usage}'
     parser.add_argument('--output', type=Path, default=Path('results'), metavar='FOLDER',
                         help='a folder named by the time is made in it, and "latest" '
-                        '(default: %(default)s)')
+                        '(default: %(default)s); with the protocol "frames" it is the folder '
+                        'itself, and what is finished there is not run again (default: '
+                        'results/RECIPE)')
     parser.add_argument('--recipe', default='quick', metavar='NAME',
                         help='the attacks: a recipe that ships, or a .yaml file like those in '
                         'config/recipes; settings of the attacker given here win over it '
@@ -64,7 +72,17 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
 
 
 def _evaluate(options: Namespace) -> None:
-    _evaluate_bag(options.bag, options)
+    from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+
+    if read_recipe(options.recipe)[1]['protocol'] == FRAMES:
+        sweep.run(options)
+        return
+    sweep.refuse_options(options)
+    if len(options.sources) != 1:
+        raise ConfigError(f'recipe {options.recipe} replays one bag, found '
+                          f'{len(options.sources)}: name one, or a recipe of the protocol '
+                          f'"{FRAMES}" such as paper')
+    _evaluate_bag(Path(options.sources[0]), options)
 
 
 def _demo(options: Namespace) -> None:

@@ -13,6 +13,8 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.paths import share_path
 
 FOLDER = 'config/recipes'
+# Every frame through the nodes, or a sample of frames without ROS (``frames``).
+LIVE, FRAMES = 'live', 'frames'
 
 
 def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
@@ -32,16 +34,14 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
         There is no such recipe, or it is not of the expected form.
 
     """
-    path = _find(name)
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
-    entries = content.get('attacks') if isinstance(content, dict) else None
-    if not isinstance(entries, list) or not entries or set(content) != {'attacks'}:
+    path, content = read_recipe(name)
+    if content.pop('protocol') != LIVE:
+        raise ConfigError(f'recipe {path} is for whole evaluations: "adversarial-lcd evaluate '
+                          'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
+    if set(content) != {'attacks'}:
         raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
     attacks: dict[str, AttackConfig] = {}
-    for entry in entries:
+    for entry in content['attacks']:
         if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
             raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
         title = entry.pop('name')
@@ -49,6 +49,36 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
         attacks[title] = AttackConfig.from_mapping({**entry, **overrides})
     return attacks
+
+
+def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
+    """
+    Return the path of a recipe and what is in it, with its protocol and a list of attacks.
+
+    Parameters
+    ----------
+    name : str
+        As in ``load_recipe``.
+
+    Raises
+    ------
+    ConfigError
+        There is no such recipe, or it has no attacks, or a protocol that is not known.
+
+    """
+    path = _find(name)
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
+    entries = content.get('attacks') if isinstance(content, dict) else None
+    if not isinstance(entries, list) or not entries:
+        raise ConfigError(f'recipe {path}: expected a list "attacks"')
+    protocol = content.setdefault('protocol', LIVE)
+    if protocol not in (LIVE, FRAMES):
+        raise ConfigError(f'recipe {path}: the protocol is {protocol!r}: expected "{LIVE}" '
+                          f'(every frame, through the nodes) or "{FRAMES}" (a sample of frames)')
+    return path, content
 
 
 def _find(name: str) -> Path:

@@ -1,0 +1,204 @@
+"""adversarial-lcd evaluate, with a recipe of the protocol "frames": many attacks, many seeds."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict
+import os
+from pathlib import Path
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from adversarial_lcd_ros.commands.common import TABLE_WIDTH, progress_bar, tell
+from adversarial_lcd_ros.config import (
+    AttackConfig,
+    BuilderConfig,
+    LabelConfig,
+    LcdConfig,
+    ReplayConfig,
+)
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.settings import chosen_settings, config_from_options
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.streams import Stream
+    from adversarial_lcd_ros.evaluation.sweep import Row, Sweep
+    from adversarial_lcd_ros.evaluation.workers import Run
+
+_OPTIONS = ('jobs', 'scheduler', 'seeds', 'cache')
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Declare what only recipes of the protocol "frames" have."""
+    group = parser.add_argument_group('recipes of the protocol "frames"')
+    group.add_argument('--jobs', type=int, metavar='N',
+                       help='processes on this machine (default: one for each core)')
+    group.add_argument('--scheduler', metavar='ADDRESS',
+                       help='run on a Dask cluster, tcp://HOST:PORT, in place of local processes')
+    group.add_argument('--seeds', type=int, metavar='N',
+                       help='seeds of every attack: 42, 43, ... (default: what the recipe says)')
+    group.add_argument('--cache', type=Path, metavar='FOLDER',
+                       help='where built graphs are kept (default: in the cache of the user)')
+
+
+def refuse_options(options: Namespace) -> None:
+    """Raise ConfigError if an option is given that only the protocol "frames" has."""
+    given = [f'--{name}' for name in _OPTIONS if getattr(options, name) is not None]
+    if given:
+        raise ConfigError(f'{", ".join(given)} belong to recipes of the protocol "frames"; '
+                          f'{options.recipe} replays a bag through the nodes')
+
+
+def run(options: Namespace) -> None:
+    """Run the recipe, or what is left of it, and write the report."""
+    from adversarial_lcd_ros.evaluation.cell_store import open_store
+    from adversarial_lcd_ros.evaluation.frame_recipes import load_cells
+    from adversarial_lcd_ros.evaluation.paper_report import write_paper_report
+    from adversarial_lcd_ros.evaluation.sweep import plan_sweep, run_sweep
+
+    started = time.monotonic()
+    _check(options)
+    cells = load_cells(options.recipe, _overrides(options))
+    lcd = config_from_options(options, LcdConfig)
+    folder = _folder(options)
+    with open_store(folder) as store:
+        streams = _open(options, sorted({cell.nodes for cell in cells}))
+        sweep = plan_sweep(streams, cells, lcd, list(store.rows))
+        _write_setup(folder, options, streams, [asdict(cell) for cell in cells])
+        _announce(options, streams, sweep)
+        try:
+            with _workers(options) as workers, _bar(sweep) as progress:
+                rows = run_sweep(sweep, store, workers, progress)
+        except KeyboardInterrupt:
+            tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
+                 'there')
+            raise
+        report = write_paper_report(folder, rows)
+    _conclude(rows, time.monotonic() - started, report)
+
+
+def _check(options: Namespace) -> None:
+    for name in ('rebuild', 'keep_recordings'):
+        if getattr(options, name):
+            raise ConfigError(f'--{name.replace("_", "-")} belongs to recipes that replay a bag; '
+                              f'{options.recipe} attacks a sample of frames without recording')
+    if chosen_settings(options, ReplayConfig):
+        raise ConfigError('settings of the replay are given, but nothing is replayed: name a '
+                          'part of a sequence as PATH@FROM:TO')
+    for name in ('jobs', 'seeds'):
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise ConfigError(f'--{name} {value}: expected 1 or more')
+    if options.jobs is not None and options.scheduler is not None:
+        raise ConfigError('--jobs and --scheduler: expected one of them; the cluster has its own '
+                          'number of workers')
+
+
+def _overrides(options: Namespace) -> dict[str, Any]:
+    """Return what the command line says about the attacks, in the words of a recipe."""
+    values = chosen_settings(options, AttackConfig)
+    if 'seed' in values:
+        raise ConfigError('--seed is for a single attack: here --seeds says how many there are')
+    lcd, builder = (chosen_settings(options, config) for config in (LcdConfig, BuilderConfig))
+    if 'target' in lcd:
+        values['target'] = lcd['target']
+    if 'hard_answers' in lcd:
+        values['oracle'] = 'hard' if lcd['hard_answers'] else 'soft'
+    if 'features' in builder:
+        values['nodes'] = builder['features']
+    if options.seeds is not None:
+        values['seeds'] = options.seeds
+    return values
+
+
+def _folder(options: Namespace) -> Path:
+    output: Path = options.output
+    return output / Path(options.recipe).stem if output == Path('results') else output
+
+
+def _open(options: Namespace, nodes: list[int]) -> list[Stream]:
+    from adversarial_lcd_ros.evaluation.streams import open_streams
+
+    with progress_bar('graphs') as progress:
+        return open_streams(options.sources, nodes, config_from_options(options, BuilderConfig),
+                            config_from_options(options, LabelConfig), options.cache,
+                            lambda source, done, total: progress(done, total))
+
+
+def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
+                 cells: list[dict[str, Any]]) -> None:
+    from adversarial_lcd_ros.evaluation.results import ENVIRONMENT, ResultsFolder, environment
+    from adversarial_lcd_ros.evaluation.sweep import FIRST_SEED, versions_digest
+
+    results = ResultsFolder(folder)
+    results.write_setup(
+        [config_from_options(options, config) for config in
+         (BuilderConfig, LcdConfig, LabelConfig)], sys.argv, FIRST_SEED,
+        {'cells': cells, 'sequences': [
+            {'source': stream.graphs.source, 'name': stream.name, 'nodes': stream.nodes,
+             'nodes_mean': stream.nodes_mean, 'frames': len(stream.labels.kind),
+             'digest': stream.digest} for stream in streams]})
+    # Rows name the releases that made them; a later run must not take away what that means.
+    results.write_json(f'{Path(ENVIRONMENT).stem}-{versions_digest()}.json', environment())
+
+
+def _announce(options: Namespace, streams: list[Stream], sweep: Sweep) -> None:
+    for stream in {stream.name: stream for stream in streams}.values():
+        tell(f'{stream.name}: {stream.labels.count("positive")} frames with a loop, '
+             f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}')
+    left = len(sweep.keys) - sweep.finished
+    where = (f'the workers of {options.scheduler}: {sweep.cost_s / 60:.0f} min of one core'
+             if options.scheduler else
+             f'{_jobs(options)} processes: about {sweep.cost_s / _jobs(options) / 60:.0f} min')
+    tell(f'{left} of {len(sweep.keys)} cells to run on {where}' if left else
+         f'all {len(sweep.keys)} cells are finished')
+
+
+def _jobs(options: Namespace) -> int:
+    jobs: int | None = options.jobs
+    return jobs or os.cpu_count() or 1
+
+
+def _workers(options: Namespace) -> AbstractContextManager[Run]:
+    from adversarial_lcd_ros.evaluation.workers import dask_workers, local_workers
+
+    if options.scheduler:
+        return dask_workers(options.scheduler)
+    return local_workers(_jobs(options))
+
+
+@contextmanager
+def _bar(sweep: Sweep) -> Iterator[Callable[[float, float], None]]:
+    """Show cells and time left; the time by the expected costs, the cells as they are counted."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as TimeLeftColumn
+
+    count = TextColumn('{task.fields[cells]} of {task.fields[all]} cells')
+    with Progress(count, BarColumn(), TextColumn('{task.percentage:.0f} %'), TimeElapsedColumn(),
+                  TextColumn('left'), TimeLeftColumn(), console=Console(stderr=True),
+                  speed_estimate_period=600) as bar:
+        task = bar.add_task('', total=1.0, cells=sweep.finished, all=len(sweep.keys))
+        yield lambda cells, share: bar.update(task, completed=share, cells=cells)
+
+
+def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from adversarial_lcd_ros.evaluation.sweep import kinds_of_cells
+
+    table = Table('attack', 'frames', 'queries, ms', 'search, ms', 'judging, ms',
+                  title='Time a frame on one core')
+    for kind, frames, seconds in kinds_of_cells(rows):
+        table.add_row(kind, str(frames), *(f'{1e3 * part:.1f}' for part in seconds))
+    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
+    console.print(table)
+    releases = sorted({row['versions'] for row in rows})
+    if len(releases) > 1:
+        console.print(f'The cells were made with several releases of the libraries: '
+                      f'{", ".join(releases)} (environment-*.json).', soft_wrap=True)
+    console.print(f'{spent_s:.0f} s; report: {report}', soft_wrap=True)

@@ -1,0 +1,182 @@
+"""The sequences of a sweep: labels and a digest here, graphs where they are attacked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+import hashlib
+from pathlib import Path
+
+from adversarial_lcd_ros.codec import encode_graph
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.graph_sequences import GraphSequence, holds_graphs, open_graphs
+from adversarial_lcd_ros.evaluation.labels import FrameLabels, label_frames
+from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.sequences import open_sequence
+
+_KEPT = 6
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class GraphSource:
+    """
+    Where graphs are, or what they are built from; equal sources have equal graphs.
+
+    Attributes
+    ----------
+    source : str
+        As for ``open_graphs``.
+    builder : BuilderConfig
+    cache : Path or None
+        Folder of built graphs; None: the user's.
+    digest : str
+        Of the graphs, hexadecimal.
+
+    """
+
+    source: str
+    builder: BuilderConfig
+    cache: Path | None
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """
+    A sequence with graphs of one size, ready to draw frames from.
+
+    Attributes
+    ----------
+    name : str
+    nodes : int
+        Features of a graph, the builder's setting.
+    nodes_mean : float
+    graphs : GraphSource
+    labels : FrameLabels
+    digest : str
+        Of graphs and labels, hexadecimal.
+
+    """
+
+    name: str
+    nodes: int
+    nodes_mean: float
+    graphs: GraphSource
+    labels: FrameLabels
+    digest: str
+
+
+def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,
+                 config: LabelConfig, cache: Path | None, progress: Progress) -> list[Stream]:
+    """
+    Open, and where needed build, the graphs of every sequence and size; label the frames.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        As for ``open_graphs``.
+    nodes : iterable of int
+        Sizes: features of a graph.
+    builder : BuilderConfig
+        All other settings of the graphs. A sequence of detections without pictures takes those
+        in place of the network.
+    config : LabelConfig
+    cache : Path or None
+        Folder of built graphs; None: the user's.
+    progress : callable
+        Called with the source, frames done and frames in all.
+
+    Raises
+    ------
+    AdversarialLcdError
+        A sequence cannot be opened, has no ground truth or no frame that could be attacked, or
+        has the name of another one.
+
+    """
+    streams: list[Stream] = []
+    for source in sources:
+        taken = {stream.name for stream in streams}
+        settings = _for_source(source, builder)
+        labels: FrameLabels | None = None
+        for size in nodes:
+            sized = replace(settings, features=size)
+            sequence = open_graphs(source, sized, cache, partial(progress, source))
+            if sequence.name in taken:
+                raise EvaluationError(f'two sequences are called {sequence.name}: rename one of '
+                                      'the folders, or leave one out')
+            # Stamps are the same in graphs of any size.
+            labels = label_sequence(sequence, config) if labels is None else labels
+            digest = graphs_digest(sequence.graphs)
+            counts = [graph.node_count for graph in sequence.graphs]
+            streams.append(Stream(sequence.name, size, sum(counts) / len(counts),
+                                  GraphSource(source, sized, cache, digest), labels,
+                                  _with_labels(digest, labels)))
+    return streams
+
+
+def _for_source(source: str, builder: BuilderConfig) -> BuilderConfig:
+    path = TrainingSource.parse(source).path
+    if builder.detector == 'onnx' and not holds_graphs(path) and open_sequence(path).detections:
+        return replace(builder, detector='csv')
+    return builder
+
+
+def label_sequence(sequence: GraphSequence, config: LabelConfig) -> FrameLabels:
+    """
+    Label the frames of a sequence.
+
+    Raises
+    ------
+    EvaluationError
+        There is no ground truth, or neither a loop nor a new place.
+
+    """
+    if sequence.trajectory is None:
+        raise EvaluationError(f'{sequence.name} has no ground truth: without it nobody knows '
+                              'which decisions are right')
+    labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in sequence.graphs],
+                          sequence.image_size, config)
+    if not labels.kind.any():
+        raise EvaluationError(f'{sequence.name}: none of {len(labels.kind)} frames is a loop or '
+                              'a new place: take a longer part, or set labels (min_gap_s is '
+                              f'{config.min_gap_s:g} s)')
+    return labels
+
+
+def graphs_digest(graphs: Iterable[MultiTierGraph]) -> str:
+    """Return a digest of all bytes of some graphs, hexadecimal."""
+    digest = hashlib.blake2b(digest_size=16)
+    for graph in graphs:
+        digest.update(encode_graph(graph))
+    return digest.hexdigest()
+
+
+def _with_labels(graphs: str, labels: FrameLabels) -> str:
+    arrays = (labels.kind, labels.possible, labels.candidates)
+    return hashlib.blake2b(graphs.encode() + b''.join(array.tobytes() for array in arrays),
+                           digest_size=16).hexdigest()
+
+
+@lru_cache(_KEPT)
+def load_stream_graphs(source: GraphSource) -> tuple[MultiTierGraph, ...]:
+    """
+    Return the graphs of a source; a process keeps those that it used last.
+
+    Raises
+    ------
+    EvaluationError
+        They are not those that were opened: another machine built them differently, or the
+        source has changed.
+
+    """
+    graphs = tuple(open_graphs(source.source, source.builder, source.cache).graphs)
+    if graphs_digest(graphs) != source.digest:
+        raise EvaluationError(f'{source.source} gives other graphs here than where the sweep was '
+                              'started: expected the same files, vocabulary and releases of the '
+                              'libraries on every machine')
+    return graphs

@@ -1,0 +1,45 @@
+"""A short walk and back in pictures, with settings under which its graphs are attacked at once."""
+
+import bag_factory as make
+
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
+
+NODES = 20
+PLACES = 6
+LABELS = LabelConfig(rule='distance', min_gap_s=0.1)
+RECIPE = """
+protocol: frames
+seeds: 2
+frames: 2
+defaults: {nodes: 20, ratio: 0.02, queries_per_edit: 2}
+attacks:
+  - perturbation: [random_flip, shortest_path]
+    surrogate: none
+  - perturbation: recall
+    surrogate: none
+    oracle: [soft, hard]
+  - perturbation: optimum
+"""
+
+
+def walk_folder(path):
+    """Write a folder in TUM's layout: six places, three metres apart, each seen twice."""
+    count = 2 * PLACES
+    make.textured_folder(path, count)
+    stamps = make.stamps(count)
+    for number, stamp in enumerate(stamps):
+        picture = make.noise(number % PLACES).astype(int) + number // PLACES
+        (path / f'rgb/{make.seconds(stamp)}.jpg').write_bytes(
+            make.encoded(picture.clip(0, 255).astype('uint8')))
+    (path / 'groundtruth.txt').write_text('# timestamp tx ty tz qx qy qz qw\n' + '\n'.join(
+        make.pose_line(stamp, 3.0 * (number % PLACES)) for number, stamp in enumerate(stamps)))
+    return path
+
+
+def builder_config(vocabulary):
+    return BuilderConfig(detector='none', vocabulary=vocabulary, features=NODES,
+                         detected_features=60)
+
+
+def lcd_config(lcd_model):
+    return LcdConfig(model=lcd_model, min_gap_s=0.1, map_window=0)

@@ -1,0 +1,84 @@
+"""Recipes of evaluations by frames."""
+
+import pytest
+
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.frame_recipes import load_cells
+from adversarial_lcd_ros.evaluation.recipes import load_recipe
+
+
+def written(tmp_path, text):
+    path = tmp_path / 'mine.yaml'
+    path.write_text(text)
+    return str(path)
+
+
+def test_the_paper_recipe_holds_what_the_paper_has_and_leaves_open():
+    cells = load_cells('paper', {})
+    surrogates = {cell.attack.surrogate for cell in cells
+                  if cell.perturbation == 'eigencentrality' and cell.attack.ratio == 3e-4}
+    assert surrogates == {'svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes'}
+    for perturbation in ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip',
+                         'recall', 'optimum'):
+        assert {cell.attack.ratio for cell in cells if cell.perturbation == perturbation} == {
+            1e-4, 2e-4, 3e-4}
+    moved = {(cell.perturbation, cell.asked_target, cell.target) for cell in cells
+             if cell.asked_target != cell.target}
+    assert moved == {(perturbation, *pair) for perturbation in ('eigencentrality', 'recall')
+                     for pair in (('wl', 'anchored'), ('anchored', 'wl'))}
+    assert {cell.oracle for cell in cells if cell.target == 'anchored'} == {'soft', 'hard'}
+    assert {cell.nodes for cell in cells} == {100, 300, 1000}
+    assert {cell.attack.queries_per_edit for cell in cells} == {10, 40}
+    assert {cell.perturbation for cell in cells if cell.attack.mode == 'surrogate'} == {
+        'eigencentrality', 'recall'}
+
+
+def test_axes_are_multiplied_and_doubles_run_once(tmp_path):
+    cells = load_cells(written(tmp_path, """
+protocol: frames
+seeds: 3
+frames: 2
+defaults: {surrogate: none, ratio: 1e-4}
+attacks:
+  - ratio: [1e-4, 0.0002]
+    target: [wl, edges]
+  - {frames: 2}
+  - {perturbation: optimum, queries_per_edit: [10, 40]}
+"""), {})
+    assert [(cell.perturbation, cell.attack.ratio, cell.target) for cell in cells] == [
+        ('eigencentrality', 1e-4, 'wl'), ('eigencentrality', 1e-4, 'edges'),
+        ('eigencentrality', 2e-4, 'wl'), ('eigencentrality', 2e-4, 'edges'),
+        ('optimum', 1e-4, 'wl')]
+    assert {(cell.seeds, cell.frames, cell.asked_target == cell.target) for cell in cells} == {
+        (3, 2, True)}
+
+
+def test_the_command_line_wins(tmp_path):
+    text = 'protocol: frames\nattacks: [{ratio: [1e-4, 2e-4], nodes: 100}, {target: edges}]'
+    cells = load_cells(written(tmp_path, text), {'ratio': 3e-4, 'nodes': 50, 'target': 'wl'})
+    assert [(cell.attack.ratio, cell.nodes, cell.target) for cell in cells] == [(3e-4, 50, 'wl')]
+
+
+@pytest.mark.parametrize(('text', 'said'), [
+    ('protocol: frames\nattacks: [{epsilon: 1}]', 'unknown epsilon'),
+    ('protocol: frames\nattacks: [{seed: 1}]', 'unknown seed'),
+    ('protocol: frames\ncolour: red\nattacks: [{}]', 'unknown colour'),
+    ('protocol: frames\ndefaults: [1]\nattacks: [{}]', 'NAME: VALUE'),
+    ('protocol: frames\nattacks: [recall]', 'NAME: VALUE'),
+    ('protocol: frames\nattacks: [{ratio: []}]', 'empty list'),
+    ('protocol: frames\nattacks: [{ratio: much}]', r'mine\.yaml.*ratio'),
+    ('protocol: frames\nattacks: [{perturbation: best}]', r'mine\.yaml.*perturbation'),
+    ('protocol: frames\nattacks: [{oracle: loud}]', r'mine\.yaml.*oracle'),
+    ('protocol: frames\nattacks: [{frames: 2}, {frames: 3}]', 'there twice'),
+    ('protocol: frames\nseeds: 0\nattacks: [{}]', 'seeds'),
+    ('protocol: dream\nattacks: [{}]', 'protocol'),
+    ('attacks: [{name: a}]', 'protocol "live"'),
+])
+def test_a_wrong_recipe_is_refused(tmp_path, text, said):
+    with pytest.raises(ConfigError, match=said):
+        load_cells(written(tmp_path, text), {})
+
+
+def test_a_recipe_of_frames_does_not_replay():
+    with pytest.raises(ConfigError, match='protocol is "live"'):
+        load_recipe('paper', {})
