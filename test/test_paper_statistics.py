@@ -182,3 +182,10 @@ def test_a_whole_table_is_summarised():
     cells = summarise_cells(make_rows(seeds=(0,), sequences=SEQUENCES[:2]))
     unattackable = {cell['nodes']: cell['unattackable'] for cell in cells}
     assert unattackable == {300: 0, 50: 60}  # floor(3e-4 * 50^2) is below one edit
+
+
+def test_settings_without_a_column_tell_cells_apart():
+    rows = [make_row(variant=variant) for variant in ('', 'gamma scale')]
+    assert [cell['variant'] for cell in summarise_cells(rows)] == ['', 'gamma scale']
+    del rows[0]['variant']
+    assert [cell['variant'] for cell in summarise_cells(rows)] == ['', 'gamma scale']

@@ -72,7 +72,7 @@ def query_curves(rows: Iterable[Row], setting: Mapping[str, object], ratio: floa
     for row in rows:
         if (row['ratio'] == ratio and row['mode'] == 'query' and row['perturbation'] != OPTIMUM
                 and (row.get('asked_target') or row['target']) == row['target']
-                and all(row[name] == value for name, value in setting.items())):
+                and all(row.get(name, '') == value for name, value in setting.items())):
             method = (wording.method_title(row), str(row['perturbation']), row['surrogate'])
             spent[method][row['sequence']].append(_queries_to_turn(row))
     largest = max((float(part[np.isfinite(part)].max(initial=0.0))

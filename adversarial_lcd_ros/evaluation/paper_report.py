@@ -42,7 +42,7 @@ _BESIDE = 6.4  # inches
 _MANY_COLUMNS = 6
 # Settings that are named only where they are not the usual ones.
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
-          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}'}
+          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}', 'variant': '{}'}
 
 Plot = dict[str, str]
 
@@ -93,7 +93,8 @@ def _values(rows: Sequence[Row], cells: Sequence[Cell],
         'warnings': paper_words.warnings(cells, tables[0] + tables[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
-        'usual': ', '.join(words.format(usual[name]) for name, words in _WORDS.items()),
+        'usual': ', '.join(words.format(usual[name]) for name, words in _WORDS.items()
+                           if usual[name] != ''),
         'verdicts': [(name, paper_words.verdict(group[0])) for name, group in zip(
             ('Surrogates', 'Perturbations'), tables, strict=False) if group],
         'surrogates': _blocks(tables[0]), 'perturbations': _blocks(tables[1]),
@@ -207,7 +208,7 @@ def _usual(cells: Sequence[Cell]) -> dict[str, Any]:
 def _full_title(summary: Cell, usual: Cell) -> str:
     return ', '.join([_title(summary), *(
         words.format(summary[name]) for name, words in _WORDS.items()
-        if summary[name] != usual[name])])
+        if summary[name] not in (usual[name], ''))])
 
 
 def _cells(cells: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, str]]]:

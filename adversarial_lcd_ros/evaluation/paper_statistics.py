@@ -28,8 +28,10 @@ from adversarial_lcd_ros.evaluation.summary import KINDS
 OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle', 'mode',
-        'ratio', 'edits', 'queries_per_edit', 'nodes')
+        'ratio', 'edits', 'queries_per_edit', 'nodes', 'variant')
 ATTACK = CELL[1:]
+# The target that is attacked, and no unusual settings, unless a row says otherwise.
+_OPTIONAL = ('asked_target', 'variant')
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
           'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
           'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
@@ -135,13 +137,14 @@ def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
 
 def _cell_key(row: Row) -> tuple[Hashable, ...]:
     missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
-               if name not in row and name != 'asked_target']
+               if name not in row and name not in _OPTIONAL]
     if missing:
         raise EvaluationError(f'a row of {row.get("sequence", "an unnamed sequence")} lacks '
                               f'{", ".join(missing)}: it was not written by this release')
     # Without another target the attack asked the one that it attacks.
-    return tuple((row.get(name) or row['target']) if name == 'asked_target' else row[name]
-                 for name in CELL)
+    given = {**row, 'asked_target': row.get('asked_target') or row['target'],
+             'variant': row.get('variant') or ''}
+    return tuple(given[name] for name in CELL)
 
 
 def _sort_key(key: tuple[Hashable, ...]) -> tuple[tuple[bool, Any], ...]:

@@ -29,7 +29,7 @@ from adversarial_lcd_ros.evaluation.paper_tables import (
 
 PAPER_RATIO = 3e-4
 PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'
-SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes')
+SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'variant')
 # Columns in the order of the paper, then ours, then the yardstick.
 _ORDER = ('svm_linear', 'svm_poly', 'naive_bayes', 'svm_rbf', 'random_flip', 'random_walk',
           'shortest_path', 'eigencentrality', 'recall', OPTIMUM)
@@ -111,6 +111,8 @@ def setting_title(setting: Cell) -> str:
         parts.append(f'{setting["queries_per_edit"]} queries an edit')
     if setting['edits'] != 'both':
         parts.append(f'{setting["edits"]} only')
+    if setting.get('variant'):
+        parts.append(setting['variant'])
     return ', '.join(parts)
 
 
