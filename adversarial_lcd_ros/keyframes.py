@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.keyframe_blocks import KEYFRAMES, Block, Query
+
+# Scored at once, the best bounds first.
+LEAST_SCORED = 64
 
 
 def bow_score(a: MultiTierGraph, b: MultiTierGraph) -> float:
@@ -20,24 +24,20 @@ def bow_score(a: MultiTierGraph, b: MultiTierGraph) -> float:
     return float(np.minimum(a.word_weight[in_a], b.word_weight[in_b]).sum())
 
 
-ScalarT = TypeVar('ScalarT', bound=np.generic)
-
-
 class Database:
     """
-    All keyframes, with their words in flat arrays that grow by doubling.
+    All keyframes, with their words in blocks that do not move when further ones come.
 
-    Scoring a query against every keyframe is one pass over those arrays.
+    Retrieval is exact: it gives what scoring every keyframe and sorting would give.
     """
 
     def __init__(self) -> None:
         self._graphs: list[MultiTierGraph] = []
-        self._stamp_ns: NDArray[np.int64] = np.zeros(64, np.int64)
-        self._word: NDArray[np.uint32] = np.zeros(1 << 14, np.uint32)
-        self._weight: NDArray[np.float32] = np.zeros(1 << 14, np.float32)
-        self._start: NDArray[np.int64] = np.zeros(64, np.int64)
-        self._used = 0
-        self._max_word = 0
+        self._stamp_ns: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._blocks: list[Block] = []
+        # Words ascending, and the number each got when it was first stored.
+        self._word: NDArray[np.uint32] = np.zeros(0, np.uint32)
+        self._number: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def __len__(self) -> int:
         """Return the number of keyframes."""
@@ -47,21 +47,42 @@ class Database:
         """Return a keyframe's graph by its index in order of insertion."""
         return self._graphs[index]
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes taken beside the graphs themselves."""
+        return (self._stamp_ns.nbytes + self._word.nbytes + self._number.nbytes
+                + sum(block.nbytes for block in self._blocks))
+
     def add(self, graph: MultiTierGraph) -> None:
         """Store a graph as the newest keyframe."""
-        index, end = len(self._graphs), self._used + len(graph.word)
-        self._stamp_ns = _grown(self._stamp_ns, index + 1)
-        self._start = _grown(self._start, index + 1)
-        self._word = _grown(self._word, end)
-        self._weight = _grown(self._weight, end)
-        self._word[self._used:end] = graph.word
-        self._weight[self._used:end] = graph.word_weight
+        index = len(self._graphs)
+        if index == len(self._blocks) * KEYFRAMES:
+            self._blocks.append(Block())
+            self._stamp_ns = np.append(self._stamp_ns[:index], np.zeros(KEYFRAMES, np.int64))
+        self._number_new(graph.word)
+        self._blocks[-1].add(self._number[np.searchsorted(self._word, graph.word)],
+                             graph.word_weight)
         self._stamp_ns[index] = graph.stamp_ns
-        self._start[index] = self._used
-        self._used = end
-        if len(graph.word):
-            self._max_word = max(self._max_word, int(graph.word[-1]))
         self._graphs.append(graph)
+
+    def _number_new(self, word: NDArray[np.uint32]) -> None:
+        new = word[~self._is_known(word)]
+        if len(new):
+            place = np.searchsorted(self._word, new)
+            self._number = np.insert(self._number, place, len(self._word) + np.arange(len(new)))
+            self._word = np.insert(self._word, place, new)
+
+    def _is_known(self, word: NDArray[np.uint32]) -> NDArray[np.bool_]:
+        known: NDArray[np.bool_] = np.zeros(len(word), np.bool_)
+        if len(self._word):
+            place = np.minimum(np.searchsorted(self._word, word), len(self._word) - 1)
+            known = self._word[place] == word
+        return known
+
+    def _query(self, graph: MultiTierGraph) -> Query:
+        known = self._is_known(graph.word)
+        number = self._number[np.searchsorted(self._word, graph.word[known])]
+        return Query(number, graph.word_weight[known], len(self._word))
 
     def admissible(self, stamp_ns: int, min_gap_ns: int) -> NDArray[np.bool_]:
         """Tell for every keyframe whether it is at least the gap older than the stamp."""
@@ -71,20 +92,61 @@ class Database:
 
     def scores(self, graph: MultiTierGraph) -> NDArray[np.float64]:
         """Return the DBoW L1 score of a graph with every keyframe, shape (keyframes,)."""
-        count = len(self._graphs)
-        weight = np.zeros(self._max_word + 1, np.float32)
-        known = graph.word <= self._max_word
-        weight[graph.word[known]] = graph.word_weight[known]
-        common = np.minimum(self._weight[:self._used], weight[self._word[:self._used]])
-        total = np.concatenate([[0.0], np.cumsum(common, dtype=np.float64)])
-        ends = np.append(self._start[1:count], self._used) if count else self._start[:0]
-        scores: NDArray[np.float64] = np.maximum(total[ends] - total[self._start[:count]], 0)
-        return scores
+        return self._scores(self._query(graph), np.arange(len(self._graphs)))
+
+    def _scores(self, query: Query, keyframes: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the scores with some keyframes, ascending."""
+        ends = np.searchsorted(keyframes, KEYFRAMES * np.arange(len(self._blocks) + 1))
+        return np.concatenate([np.zeros(0), *(
+            block.scores(query, keyframes[ends[place]:ends[place + 1]] - KEYFRAMES * place)
+            for place, block in enumerate(self._blocks) if ends[place] < ends[place + 1])])
+
+    def retrieve(self, graph: MultiTierGraph, admissible: NDArray[np.bool_], count: int,
+                 window: int = 0) -> tuple[list[int], list[float]]:
+        """
+        Return the most alike keyframes by falling score, and their scores; older ones of equals.
+
+        Parameters
+        ----------
+        graph : MultiTierGraph
+        admissible : bool, (keyframes,)
+            Those to choose from.
+        count : int
+            Most keyframes to return.
+        window : int
+            None is returned that is so near in the map to one before it.
+
+        """
+        query = self._query(graph)
+        bound = np.concatenate([np.zeros(0), *(block.bounds(query) for block in self._blocks)])
+        bound[~admissible] = -1
+        score = np.where(bound == 0, 0.0, -1.0)
+        # Each one chosen rules out 2 window others: among so many are enough.
+        worst = _largest(bound, max(LEAST_SCORED, count * (2 * window + 1)))
+        while True:
+            doubtful = np.flatnonzero((score < 0) & (bound >= max(worst, 0)))
+            score[doubtful] = self._scores(query, doubtful)
+            chosen = _spread(score, count, window)
+            if not len(doubtful):
+                return chosen, score[chosen].tolist()
+            worst = score[chosen[-1]] if len(chosen) == count else 0.0
 
 
-def _grown(array: NDArray[ScalarT], size: int) -> NDArray[ScalarT]:
-    if size <= len(array):
-        return array
-    larger = np.zeros(max(size, 2 * len(array)), array.dtype)
-    larger[:len(array)] = array
-    return larger
+def _largest(values: NDArray[np.float64], count: int) -> float:
+    """Return the count-th largest value; 0 if there are fewer."""
+    return float(np.partition(values, -count)[-count]) if len(values) > count else 0.0
+
+
+def _spread(score: NDArray[np.float64], count: int, window: int) -> list[int]:
+    """Return indices by falling score, at least 0, none within the window of one before it."""
+    alike = np.flatnonzero(score > 0)
+    alike = alike[np.argsort(-score[alike], kind='stable')]
+    free = np.ones(len(score), np.bool_)
+    chosen: list[int] = []
+    for index in chain(alike, np.flatnonzero(score == 0)):
+        if len(chosen) == count:
+            break
+        if free[index]:
+            chosen.append(int(index))
+            free[max(0, index - window):index + window + 1] = False
+    return chosen

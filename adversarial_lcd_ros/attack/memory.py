@@ -65,10 +65,8 @@ class Memory:
 
     def similar(self, graph: MultiTierGraph, count: int) -> list[tuple[int, float]]:
         """Return the graphs of the past that share most visual words, as (index, score)."""
-        score = self._database.scores(graph)
-        score[~self._database.admissible(graph.stamp_ns, self._gap_ns)] = -1
-        best = np.argsort(-score, kind='stable')[:count]
-        return [(int(index), float(score[index])) for index in best if score[index] >= 0]
+        old = self._database.admissible(graph.stamp_ns, self._gap_ns)
+        return list(zip(*self._database.retrieve(graph, old, count), strict=True))
 
     def neighbours(self, index: int) -> range:
         """Return a graph of the past with the ones just before and after it."""

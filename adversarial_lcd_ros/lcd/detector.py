@@ -33,9 +33,10 @@ class QueryNodes:
     base : View
         The first graph judged. Later ones are the cheaper the fewer edges they have changed,
         and are judged the same whichever came first.
-    bow : float64, (keyframes,)
     candidates : list of int
         Keyframes, r' of them.
+    bow : list of float, (r',)
+        vBoW score of each candidate.
     average : float64, (r', r)
         Weight of each reference in the window of each candidate.
     comparison : Comparison
@@ -46,8 +47,8 @@ class QueryNodes:
 
     key: tuple[object, ...]
     base: View
-    bow: NDArray[np.float64]
     candidates: list[int]
+    bow: list[float]
     average: NDArray[np.float64]
     comparison: Comparison
     scores: Scores
@@ -111,7 +112,7 @@ class LoopClosureDetector:
             graph.stamp_ns, graph.frame_id, graph.sequence,
             is_loop=chance >= self.config.threshold, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
-            vbow_score=float(nodes.bow[keyframe]), candidates=len(nodes.candidates))
+            vbow_score=nodes.bow[best], candidates=len(nodes.candidates))
 
     def log_odds(self, graph: MultiTierGraph) -> NDArray[np.float64]:
         """Return the log odds of a loop with each candidate, the most alike by words first."""
@@ -130,28 +131,15 @@ class LoopClosureDetector:
 
     def _compare_nodes(self, graph: MultiTierGraph, key: tuple[object, ...]) -> QueryNodes:
         old = self._database.admissible(graph.stamp_ns, round(self.config.min_gap_s * 1e9))
-        bow = self._database.scores(graph)
-        candidates = self._retrieve(bow, old)
+        candidates, bow = self._database.retrieve(
+            graph, old, self.config.candidates, self.config.map_window)
         around = [self._window(candidate, old) for candidate in candidates]
         keyframes = sorted({keyframe for window in around for keyframe in window})
         average = np.array([np.isin(keyframes, window) / len(window) for window in around])
         query = View(graph)
         comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
-        return QueryNodes(key, query, bow, candidates, average, comparison,
+        return QueryNodes(key, query, candidates, bow, average, comparison,
                           prepare(self._target, query, comparison))
-
-    def _retrieve(self, bow: NDArray[np.float64], old: NDArray[np.bool_]) -> list[int]:
-        """Return keyframes by falling vBoW score, none in another's map window."""
-        taken = ~old
-        chosen: list[int] = []
-        for keyframe in np.argsort(-bow, kind='stable'):
-            if not taken[keyframe]:
-                chosen.append(int(keyframe))
-                taken[max(0, keyframe - self.config.map_window):
-                      keyframe + self.config.map_window + 1] = True
-                if len(chosen) == self.config.candidates:
-                    break
-        return chosen
 
     def _window(self, candidate: int, old: NDArray[np.bool_]) -> list[int]:
         """Return the candidate and the keyframes around it that are old enough, too."""

@@ -99,11 +99,9 @@ def retrieved_pairs(graphs: Sequence[MultiTierGraph], relation: NDArray[np.int8]
     database = Database()
     found: list[tuple[int, int]] = []
     for query, graph in enumerate(graphs):
-        scores = database.scores(graph)
-        scores[~database.admissible(graph.stamp_ns, min_gap_ns)] = -1
-        best = np.argsort(-scores, kind='stable')[:count]
-        found += [(query, int(reference)) for reference in best
-                  if scores[reference] >= 0 and relation[query, reference] < 0]
+        old = database.admissible(graph.stamp_ns, min_gap_ns)
+        best, _ = database.retrieve(graph, old, count)
+        found += [(query, reference) for reference in best if relation[query, reference] < 0]
         database.add(graph)
     return np.array(found, np.int64).reshape(-1, 2)
 

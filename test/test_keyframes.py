@@ -1,0 +1,80 @@
+"""Retrieval of keyframes: exactly what scoring all of them and sorting gives."""
+
+from dataclasses import replace
+
+from graph_factory import make_graph
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros import keyframe_blocks, keyframes
+from adversarial_lcd_ros.keyframes import Database
+
+PLAIN = make_graph()
+
+
+def with_words(words):
+    """Return a graph with a vBoW vector from a mapping of words to weights."""
+    word = np.array(sorted(words), np.uint32)
+    weight = np.array([words[int(key)] for key in word], np.float32)
+    return replace(PLAIN, word=word, word_weight=weight)
+
+
+# Few words and few weights, so that scores tie; more words than columns; any weight at all.
+FEW = st.dictionaries(st.integers(0, 6), st.sampled_from([0.0, 2.0 ** -13, 0.1, 0.2]), max_size=6)
+ANY = st.dictionaries(st.integers(0, 2**32 - 1) | st.integers(0, 40),
+                      st.floats(0, 2, width=32) | st.floats(0, 2.0 ** -12, width=32), max_size=40)
+VECTORS = (st.lists(words.map(with_words), min_size=1, max_size=12) for words in (FEW, ANY))
+
+
+def score_of(a, b):
+    """Return the sum of the smaller weights, added up by ascending word."""
+    weight = dict(zip(a.word.tolist(), a.word_weight.tolist(), strict=True))
+    return sum((min(value, weight.get(word, 0.0)) for word, value in
+                zip(b.word.tolist(), b.word_weight.tolist(), strict=True)), 0.0)
+
+
+def by_sorting(stored, query, admissible, count, window):
+    """Return what retrieval shall give, by scoring every keyframe and sorting."""
+    score = np.array([score_of(query, graph) for graph in stored])
+    free, chosen = admissible.copy(), []
+    for index in np.argsort(-score, kind='stable'):
+        if free[index] and len(chosen) < count:
+            chosen.append(int(index))
+            free[max(0, index - window):index + window + 1] = False
+    return chosen, score[chosen].tolist()
+
+
+@given(st.one_of(*VECTORS), st.integers(1, 4), st.integers(0, 2), st.integers(1, 4),
+       st.sampled_from([5, 4096]), st.randoms())
+@settings(deadline=None, max_examples=60)
+def test_retrieval_is_what_sorting_all_scores_gives(
+        graphs, count, window, least, columns, random):
+    *stored, query = graphs
+    admissible = np.array([random.random() < 0.7 for _ in stored], bool)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(keyframe_blocks, 'COLUMNS', columns)
+        for module in (keyframe_blocks, keyframes):
+            patch.setattr(module, 'KEYFRAMES', 3)
+        patch.setattr(keyframes, 'LEAST_SCORED', least)
+        database = Database()
+        for graph in stored:
+            database.add(graph)
+        assert database.retrieve(query, admissible, count, window) == by_sorting(
+            stored, query, admissible, count, window)
+        assert database.scores(query).tolist() == [score_of(query, graph) for graph in stored]
+
+
+def test_an_empty_database_gives_nothing():
+    assert Database().retrieve(PLAIN, np.zeros(0, bool), 5) == ([], [])
+
+
+def test_what_a_keyframe_takes_does_not_grow_with_their_number():
+    database = Database()
+    for _ in range(2):
+        database.add(PLAIN)
+    empty = database.nbytes
+    for _ in range(1000):
+        database.add(PLAIN)
+    assert database.nbytes - empty <= 1000 * 2 * 8 * len(PLAIN.word)
