@@ -1,4 +1,5 @@
 # make demo: attack loop closure detection on the embedded tour; report in results/latest
+# make paper: the paper's experiments over the sequences in DATA; report in results/paper
 # make test, make lint, make bench, make clean
 #
 # The first target sets up .venv and the object model; after that nothing is downloaded or built.
@@ -6,6 +7,9 @@
 
 PYTHON ?= python3
 ARGS ?=
+DATA ?= ../shared/data
+PAPER ?= flat_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy@0.5:1 \
+  rgbd_dataset_freiburg3_long_office_household
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
@@ -16,11 +20,18 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint bench clean setup model
+.PHONY: demo paper test lint bench clean setup model
 .DEFAULT_GOAL := demo
 
 demo: model
 	$(BIN)/adversarial-lcd demo $(ARGS)
+
+# Half of freiburg1_rpy: the target was trained on the other one.
+paper: model
+	@for sequence in $(PAPER); do test -e "$(DATA)/$${sequence%@*}" || { echo \
+	  "error: there is no $(DATA)/$${sequence%@*}; make paper DATA=FOLDER, or PAPER='NAME ...' for others" \
+	  >&2; exit 1; }; done
+	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper --output results/paper $(ARGS)
 
 test: model
 	$(BIN)/python -m pytest -n 2 $(ARGS)

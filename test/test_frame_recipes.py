@@ -43,7 +43,7 @@ attacks:
   - ratio: [1e-4, 0.0002]
     target: [wl, edges]
   - {frames: 2}
-  - {perturbation: optimum, queries_per_edit: [10, 40]}
+  - {perturbation: optimum, queries_per_edit: [10, 40], oracle: [soft, hard]}
 """), {})
     assert [(cell.perturbation, cell.attack.ratio, cell.target) for cell in cells] == [
         ('eigencentrality', 1e-4, 'wl'), ('eigencentrality', 1e-4, 'edges'),

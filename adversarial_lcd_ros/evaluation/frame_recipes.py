@@ -119,13 +119,15 @@ def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     attack = {name: _number(value) if name in _FLOATS else value
               for name, value in values.items() if name not in own_names}
     perturbation = attack.get('perturbation', AttackConfig.perturbation)
+    unused: tuple[str, ...] = ()
     if perturbation == Optimum.name:
         # It asks nobody and learns nothing: all else would tell equal cells apart.
         attack = {'surrogate': 'none', **{name: attack[name] for name in ('ratio', 'edits')
                                           if name in attack}}
+        unused = ('oracle', 'asked_target')
     try:
         own = CellConfig.from_mapping({name: value for name, value in values.items()
-                                       if name in own_names})
+                                       if name in own_names and name not in unused})
         config = AttackConfig.from_mapping(attack)
     except ConfigError as error:
         raise ConfigError(f'recipe {path}: {error}') from error
