@@ -19,6 +19,7 @@ from adversarial_lcd_ros.commands import (
     inspect,
     params,
     report,
+    targets,
     train,
 )
 from adversarial_lcd_ros.errors import AdversarialLcdError
@@ -51,7 +52,7 @@ def _parser() -> ArgumentParser:
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                train.add, fetch_model.add, inspect.add, params.add):
+                targets.add, train.add, fetch_model.add, inspect.add, params.add):
         add(commands)
     return parser
 

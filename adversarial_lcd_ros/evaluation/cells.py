@@ -109,8 +109,8 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
               if name not in ('seed', 'surrogate_data')}
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
               'detector': detector, 'attack': attack, **cell.settings,
-              'files': [_file_digest(path) for path in _files(cell, lcd)]}
-    return _digest(json.dumps(values, sort_keys=True).encode())
+              'files': [file_digest(path) for path in _files(cell, lcd)]}
+    return digest_of(json.dumps(values, sort_keys=True).encode())
 
 
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
@@ -123,15 +123,17 @@ def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
 
 
 @lru_cache(32)
-def _file_digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Return the digest of a model file, hexadecimal; raises ModelError."""
     try:
-        return _digest(path.read_bytes())
+        return digest_of(path.read_bytes())
     except OSError as error:
         raise ModelError(f'{path} cannot be read: {error.strerror}; name a file that '
                          '"adversarial-lcd train" wrote') from error
 
 
-def _digest(data: bytes) -> str:
+def digest_of(data: bytes) -> str:
+    """Return the digest of some bytes, hexadecimal."""
     return hashlib.blake2b(data, digest_size=16).hexdigest()
 
 

@@ -66,7 +66,7 @@ def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
         There is no such recipe, or it has no attacks, or a protocol that is not known.
 
     """
-    path = _find(name)
+    path = find_recipe(name)
     try:
         content = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -81,7 +81,8 @@ def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
     return path, content
 
 
-def _find(name: str) -> Path:
+def find_recipe(name: str) -> Path:
+    """Return the path of a recipe that ships, or of a YAML file; raises ConfigError."""
     if name.endswith(('.yaml', '.yml')):
         return Path(name)
     folder = share_path(FOLDER)

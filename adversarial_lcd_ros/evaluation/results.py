@@ -67,7 +67,7 @@ class ResultsFolder:
             raise EvaluationError(f'no results folder can be made in {root}: {error.strerror}; '
                                   'choose another one') from error
 
-    def write_json(self, name: str, values: Mapping[str, Any]) -> None:
+    def write_json(self, name: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
         """Write a JSON file; what is not a finite number becomes null."""
         text = json.dumps(_plain(values), indent=2, allow_nan=False)
         (self.path / name).write_text(text + '\n', encoding='utf-8')

@@ -1,0 +1,130 @@
+"""adversarial-lcd targets: what the detectors are worth before any attack."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import asdict
+import os
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING
+
+from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar, tell
+from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.settings import add_config_options, chosen_settings
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.streams import Stream
+    from adversarial_lcd_ros.evaluation.target_recipes import TargetSequence
+    from adversarial_lcd_ros.evaluation.target_run import TargetTask
+
+PROTOCOLS = ('pairs', 'live')
+TABLES = 'target.md'
+_CONFIGS = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (LabelConfig, 'label-'))
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands, 'targets', 'Evaluate the detectors before any attack, on pairs and live.', _run)
+    parser.usage = f'{parser.prog} [SEQUENCE ...] [OPTIONS]'
+    parser.add_argument('sources', nargs='*', metavar='SEQUENCE',
+                        help='bag, folder or bag of graphs with ground truth; PATH@FROM:TO takes '
+                        'a part of its frames')
+    parser.add_argument('--recipe', metavar='NAME', help='sequences with their settings: a '
+                        'recipe that ships ("target"), or a .yaml file like it')
+    parser.add_argument('--data', type=Path, default=Path('../shared/data'), metavar='FOLDER',
+                        help='where the sequences of a recipe are (default: %(default)s)')
+    parser.add_argument('--output', type=Path, default=Path('results/target'), metavar='FOLDER',
+                        help='rows that are there are not run again (default: %(default)s)')
+    parser.add_argument('--targets', nargs='+', choices=TARGETS, metavar='NAME',
+                        help=f'those to evaluate (default: {" ".join(TARGETS)}, or what the '
+                        'recipe says)')
+    parser.add_argument('--protocols', nargs='+', choices=PROTOCOLS, default=PROTOCOLS,
+                        metavar='NAME', help='pairs, live, or both (default)')
+    parser.add_argument('--nodes', nargs='+', type=int, metavar='N',
+                        help='features of a graph, several for several sizes (default: that of '
+                        'graph_builder, or what the recipe says)')
+    parser.add_argument('--pairs', type=int, default=300, metavar='N',
+                        help='most loops, and as many pairs of different places, of a draw '
+                        '(default: %(default)s)')
+    parser.add_argument('--draws', type=int, default=3, metavar='N',
+                        help='draws of pairs, each with a seed of its own (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=401, metavar='N',
+                        help='of the first draw (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='processes (default: one for each core)')
+    parser.add_argument('--cache', type=Path, metavar='FOLDER',
+                        help='where built graphs are kept (default: in the cache of the user)')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML); options of the command line win over it')
+    for config, prefix in _CONFIGS:
+        add_config_options(parser, config, prefix)
+
+
+def _run(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.cell_store import open_store
+    from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder
+    from adversarial_lcd_ros.evaluation.target_run import run_target
+    from adversarial_lcd_ros.evaluation.target_tables import target_tables
+    from adversarial_lcd_ros.evaluation.workers import local_workers
+
+    for name in ('pairs', 'draws', 'jobs'):
+        if getattr(options, name) < 1:
+            raise ConfigError(f'--{name} {getattr(options, name)}: expected 1 or more')
+    sequences = _sequences(options)
+    with open_store(options.output) as store:
+        tasks = _tasks(options, sequences)
+        results = ResultsFolder(options.output)
+        results.write_setup([], sys.argv, options.seed,
+                            {'sequences': [asdict(sequence) for sequence in sequences]})
+        left = [task for task in tasks if task.key not in store.rows]
+        tell(f'{len(left)} of {len(tasks)} rows to make')
+        with local_workers(options.jobs) as run, progress_bar('targets') as progress:
+            progress(0, len(left))
+            for done, (key, row) in enumerate(run(run_target, left)):
+                store.add(key, row)
+                progress(done + 1, len(left))
+        rows = [store.rows[task.key] for task in tasks]
+        results.write_json(SUMMARY, rows)
+    tables = target_tables(rows)
+    (options.output / TABLES).write_text(tables, encoding='utf-8')
+    print(tables, end='')
+    print(options.output / SUMMARY)
+
+
+def _sequences(options: Namespace) -> list[TargetSequence]:
+    from adversarial_lcd_ros.evaluation.target_recipes import (
+        Choices,
+        named_sequences,
+        recipe_sequences,
+    )
+
+    if bool(options.sources) == bool(options.recipe):
+        raise ConfigError('expected either sequences or --recipe NAME')
+    builder, lcd, labels = (chosen_settings(options, config) for config, _ in _CONFIGS)
+    if 'target' in lcd:
+        raise ConfigError('--lcd-target names one target: here --targets does')
+    choices = Choices(builder, lcd, labels, tuple(options.nodes or ()),
+                      tuple(options.targets or ()))
+    if options.recipe:
+        return recipe_sequences(options.recipe, options.data, choices)
+    return named_sequences(options.sources, choices)
+
+
+def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTask]:
+    from adversarial_lcd_ros.evaluation.target_run import TargetTask
+
+    seeds = tuple(range(options.seed, options.seed + options.draws))
+    return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds)
+            for sequence in sequences for stream in _streams(sequence, options.cache)
+            for protocol in options.protocols for target in sequence.targets]
+
+
+def _streams(sequence: TargetSequence, cache: Path | None) -> list[Stream]:
+    from adversarial_lcd_ros.evaluation.streams import open_streams
+
+    with progress_bar(f'graphs of {Path(sequence.source).name}') as progress:
+        return open_streams([sequence.source], sequence.nodes, sequence.builder, sequence.labels,
+                            cache, lambda _, done, total: progress(done, total))

@@ -1,0 +1,116 @@
+"""Recipes of an evaluation of the targets: sequences, and the settings that each needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from adversarial_lcd_ros.config import TARGETS, BuilderConfig, Config, LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.recipes import find_recipe
+
+ConfigT = TypeVar('ConfigT', bound=Config)
+_KEYS = ('source', 'nodes', 'targets', 'builder', 'lcd', 'labels')
+
+
+@dataclass(frozen=True)
+class TargetSequence:
+    """
+    A sequence to evaluate targets on.
+
+    Attributes
+    ----------
+    source : str
+        As for ``open_graphs``.
+    builder, lcd, labels
+        Settings.
+    nodes : tuple of int
+        Features of a graph.
+    targets : tuple of str
+
+    """
+
+    source: str
+    builder: BuilderConfig
+    lcd: LcdConfig
+    labels: LabelConfig
+    nodes: tuple[int, ...]
+    targets: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the command line says; settings win over those of a recipe."""
+
+    builder: Mapping[str, Any]
+    lcd: Mapping[str, Any]
+    labels: Mapping[str, Any]
+    nodes: tuple[int, ...] = ()
+    targets: tuple[str, ...] = ()
+
+
+def named_sequences(sources: Sequence[str], choices: Choices) -> list[TargetSequence]:
+    """Return sequences that the command line names, with its settings."""
+    return [_sequence(source, {}, choices) for source in sources]
+
+
+def recipe_sequences(name: str, data: Path, choices: Choices) -> list[TargetSequence]:
+    """
+    Return the sequences of a recipe.
+
+    Parameters
+    ----------
+    name : str
+        A recipe that ships, or the path of a YAML file like config/recipes/target.yaml.
+    data : Path
+        Folder that the sources are in.
+    choices : Choices
+
+    Raises
+    ------
+    ConfigError
+        There is no such recipe or folder, or it is not of the expected form.
+
+    """
+    path = find_recipe(name)
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
+    entries = content.get('sequences') if isinstance(content, dict) else None
+    if not isinstance(entries, list) or not entries or set(content) != {'sequences'}:
+        raise ConfigError(f'recipe {path}: expected a list "sequences" and nothing else')
+    if not data.is_dir():
+        raise ConfigError(f'there is no folder {data} with the sequences of recipe {name}: say '
+                          'where they are with --data, or name sequences of your own')
+    for entry in entries:
+        if not isinstance(entry, dict) or not isinstance(entry.get('source'), str):
+            raise ConfigError(f'recipe {path}: {entry!r} is no sequence with a source')
+        unknown = sorted(set(entry) - set(_KEYS))
+        if unknown:
+            raise ConfigError(f'recipe {path}: unknown key {", ".join(unknown)}; there are: '
+                              f'{", ".join(_KEYS)}')
+    return [_sequence(str(data / entry['source']), entry, choices) for entry in entries]
+
+
+def _sequence(source: str, entry: Mapping[str, Any], choices: Choices) -> TargetSequence:
+    builder = _merged(BuilderConfig, entry.get('builder'), choices.builder)
+    nodes = choices.nodes or tuple(entry.get('nodes') or (builder.features,))
+    targets = choices.targets or tuple(entry.get('targets') or TARGETS)
+    unknown = sorted(set(targets) - set(TARGETS))
+    if unknown:
+        raise ConfigError(f'{source}: no target {", ".join(unknown)}; there are: '
+                          f'{", ".join(TARGETS)}')
+    return TargetSequence(source, builder, _merged(LcdConfig, entry.get('lcd'), choices.lcd),
+                          _merged(LabelConfig, entry.get('labels'), choices.labels), nodes,
+                          targets)
+
+
+def _merged(config: type[ConfigT], own: Any, chosen: Mapping[str, Any]) -> ConfigT:
+    if own is not None and not isinstance(own, dict):
+        raise ConfigError(f'{config.__name__}: expected settings by name, found {own!r}')
+    return config.from_mapping({**(own or {}), **chosen})

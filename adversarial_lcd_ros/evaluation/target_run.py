@@ -1,0 +1,181 @@
+"""
+What a detector is worth before any attack: every target, on pairs and live.
+
+Pairs are the paper's "accuracy": as many loops as other places, judged one by one. Live, every
+frame of a replay is judged against the keyframes before it, retrieval by words included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.evaluation import statistics
+from adversarial_lcd_ros.evaluation.cells import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
+from adversarial_lcd_ros.evaluation.metrics import (
+    Metrics,
+    first_closure_latency_s,
+    measure,
+    outcomes,
+    right,
+)
+from adversarial_lcd_ros.evaluation.offline import run_offline
+from adversarial_lcd_ros.evaluation.pairs import sample_pairs
+from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.targets import make_target
+from adversarial_lcd_ros.lcd.training import LabelledPairs, PairScorer
+from adversarial_lcd_ros.paths import model_path
+
+SCHEMA = 1
+PROTOCOLS = ('pairs', 'live')
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class TargetTask:
+    """
+    A target on a sequence by one protocol.
+
+    Attributes
+    ----------
+    stream : Stream
+    target : str
+    protocol : str
+        'pairs' or 'live'.
+    lcd : LcdConfig
+        Of the detector, but for its target.
+    pairs : int
+        Most loops, and as many pairs of different places, of a draw.
+    seeds : tuple of int
+        One draw of pairs each.
+
+    """
+
+    stream: Stream
+    target: str
+    protocol: str
+    lcd: LcdConfig
+    pairs: int
+    seeds: tuple[int, ...]
+
+    @property
+    def key(self) -> str:
+        """Digest of all that the figures depend on, hexadecimal."""
+        values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
+                  'detector': {**asdict(self.lcd), 'target': self.target},
+                  'model': file_digest(self._model), 'seeds': self.seeds}
+        if self.protocol == 'pairs':
+            values['pairs'] = self.pairs
+        return digest_of(json.dumps(values, sort_keys=True).encode())
+
+    @property
+    def _model(self) -> Path:
+        return Path(self.lcd.model) if self.lcd.model else model_path(f'target_{self.target}.json')
+
+    def decision(self) -> Decision:
+        """Return the trained decision of the target."""
+        target = make_target(self.target)
+        return Decision.load(self._model, target.name, target.channels)
+
+
+def run_target(task: TargetTask) -> tuple[str, Row]:
+    """
+    Return the key of a task and its row.
+
+    The row has ``sequence, target, protocol, nodes, nodes_mean, frames, positives, negatives,
+    trained_on, balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc,
+    precision, recall``, and ``n_pairs, seeds`` or ``n_frames, latency_to_first_closure_s``.
+    Undefined figures are None.
+
+    Raises
+    ------
+    EvaluationError
+        The sequence has no pair of a class.
+
+    """
+    figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
+    stream = task.stream
+    return task.key, {
+        'sequence': stream.name, 'target': task.target, 'protocol': task.protocol,
+        'nodes': stream.nodes, 'nodes_mean': stream.nodes_mean,
+        'frames': len(stream.labels.kind), 'trained_on': trained_on(stream.graphs.source),
+        **figures}
+
+
+def trained_on(source: str) -> bool:
+    """Tell whether the models that ship were trained on frames of a source, by their card."""
+    part = TrainingSource.parse(source)
+    card = json.loads(model_path('MODEL_CARD.json').read_text(encoding='utf-8'))
+    name = part.path.resolve().stem
+    return any(entry['name'] == name and entry['part'][0] < part.stop
+               and part.start < entry['part'][1] for entry in card['sequences'])
+
+
+def _pairs(task: TargetTask) -> Row:
+    labels, decision = task.stream.labels, task.decision()
+    graphs = load_stream_graphs(task.stream.graphs)
+    lower = np.tril(labels.relation, -1)
+    count = min(task.pairs, *(int((lower == value).sum()) for value in (POSITIVE, NEGATIVE)))
+    scorer = PairScorer(make_target(task.target), graphs, task.lcd.map_window)
+    query, is_loop, logit = [], [], []
+    for seed in task.seeds:
+        drawn = sample_pairs(labels.relation, np.random.default_rng(seed), count)
+        pairs = LabelledPairs(graphs, drawn.query, drawn.reference, drawn.is_loop)
+        query.append(drawn.query)
+        is_loop.append(drawn.is_loop)
+        logit.append(decision.logit(scorer.pairs(pairs)))
+    kind = np.where(np.concatenate(is_loop), POSITIVE, NEGATIVE).astype(np.int8)
+    probability = 1 / (1 + np.exp(-np.concatenate(logit)))
+    declared = probability >= task.lcd.threshold
+    metrics = measure(kind, declared, probability, np.ones(len(kind), bool))
+    return {**_figures(metrics), 'n_pairs': len(kind), 'seeds': len(task.seeds),
+            'ci95': _pair_interval(labels, np.concatenate(query), kind,
+                                   declared == (kind == POSITIVE))}
+
+
+def _pair_interval(labels: FrameLabels, query: NDArray[np.int64], kind: NDArray[np.int8],
+                   correct: NDArray[np.bool_]) -> list[float] | None:
+    """Return the interval over blocks of query frames: pairs of one frame are near copies."""
+    size = np.zeros((2, len(labels.kind)), np.int64)
+    total = np.zeros_like(size)
+    row = (kind == NEGATIVE).astype(np.int64)
+    np.add.at(size, (row, query), 1)
+    np.add.at(total, (row, query), correct)
+    interval = statistics.class_mean_interval(
+        size, total, statistics.block_frames(labels.stamp_ns), seed=0)
+    return list(interval) if interval else None
+
+
+def _live(task: TargetTask) -> Row:
+    labels = task.stream.labels
+    run, _ = run_offline(load_stream_graphs(task.stream.graphs),
+                         replace(task.lcd, target=task.target))
+    frame_of = {int(stamp): frame for frame, stamp in enumerate(labels.stamp_ns)}
+    match = np.array([NO_MATCH if decision.match_stamp_ns is None
+                      else frame_of[decision.match_stamp_ns] for decision in run.decisions])
+    correct = labels.is_correct(np.arange(len(match)), match)
+    is_loop = np.array([decision.is_loop for decision in run.decisions])
+    probability = np.array([decision.probability for decision in run.decisions])
+    metrics = measure(labels.kind, is_loop, probability, correct)
+    outcome = outcomes(labels.kind, is_loop, correct)
+    interval = statistics.balanced_accuracy_interval(
+        labels.kind, right(outcome), statistics.block_frames(labels.stamp_ns), seed=0)
+    return {**_figures(metrics), 'n_frames': len(match), 'wrong_matches': metrics.wrong_matches,
+            'ci95': list(interval) if interval else None,
+            'latency_to_first_closure_s': first_closure_latency_s(
+                labels.stamp_ns, labels.kind, outcome)}
+
+
+def _figures(metrics: Metrics) -> Row:
+    return {name: getattr(metrics, name) for name in (
+        'positives', 'negatives', 'balanced_accuracy', 'average_precision',
+        'recall_at_100_precision', 'mcc', 'precision', 'recall')}

@@ -1,0 +1,66 @@
+"""The figures of the targets as tables in Markdown, for pages and for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from adversarial_lcd_ros.config import TARGETS
+
+Row = Mapping[str, Any]
+_HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average precision',
+                    'recall at 100 % precision', 'MCC'),
+          'live': ('loops / new places', 'balanced accuracy', '95 % interval', 'precision',
+                   'recall', 'recall at 100 % precision', 'average precision', 'MCC',
+                   'first loop found after')}
+
+
+def target_tables(rows: Iterable[Row]) -> str:
+    """Return a table for each protocol, in the order of sequences, sizes and targets."""
+    rows = list(rows)
+    order = {name: place for place, name in enumerate(TARGETS)}
+    parts = []
+    for protocol, head in _HEADS.items():
+        chosen = [row for row in rows if row['protocol'] == protocol]
+        if not chosen:
+            continue
+        names = list(dict.fromkeys(row['sequence'] for row in chosen))
+        chosen.sort(key=lambda row: (names.index(row['sequence']), row['nodes'],
+                                     order[row['target']]))
+        lines = [_line(('sequence', 'n', 'target', *head)), _line(['---'] * (len(head) + 3))]
+        for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'])):
+            lines += _group_lines(list(group))
+        parts.append('\n'.join(lines))
+    return '\n\n'.join(parts) + '\n'
+
+
+def _group_lines(group: Sequence[Row]) -> list[str]:
+    lines = []
+    for place, row in enumerate(group):
+        name = row['sequence'] + (' (seen in training)' if row['trained_on'] else '')
+        first = (name, f'{row["nodes_mean"]:.0f}') if not place else ('', '')
+        lines.append(_line((*first, f'`{row["target"]}`', *_cells(row))))
+    return lines
+
+
+def _cells(row: Row) -> list[str]:
+    interval = row['ci95'] and f'{_share(row["ci95"][0])} to {_share(row["ci95"][1])}'
+    accuracy = [_share(row['balanced_accuracy']), interval or '-']
+    if row['protocol'] == 'pairs':
+        return [f'{row["n_pairs"]} ({row["positives"]} loops)', *accuracy,
+                *(_share(row[name]) for name in
+                  ('average_precision', 'recall_at_100_precision', 'mcc'))]
+    latency = row['latency_to_first_closure_s']
+    return [f'{row["positives"]} / {row["negatives"]}', *accuracy,
+            *(_share(row[name]) for name in ('precision', 'recall', 'recall_at_100_precision',
+                                             'average_precision', 'mcc')),
+            '-' if latency is None else f'{latency:.1f} s']
+
+
+def _share(value: float | None) -> str:
+    return '-' if value is None else f'{value:.3f}'
+
+
+def _line(cells: Iterable[str]) -> str:
+    return f'| {" | ".join(cells)} |'

@@ -1,0 +1,102 @@
+"""The command "targets": figures of detectors before any attack."""
+
+from contextlib import contextmanager
+import json
+
+import numpy as np
+import pytest
+from sweep_factory import walk_folder
+
+from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation import workers
+from adversarial_lcd_ros.evaluation.target_recipes import Choices, recipe_sequences
+from adversarial_lcd_ros.evaluation.target_run import trained_on
+
+NOTHING = Choices({}, {}, {})
+
+
+@pytest.fixture
+def command(tmp_path, vocabulary, monkeypatch):
+    """Return a function that runs the command on a short walk, in this process."""
+    @contextmanager
+    def one_process(jobs):
+        yield map
+    monkeypatch.setattr(workers, 'local_workers', one_process)
+    walk_folder(tmp_path / 'walk')
+    settings = {
+        'cache': tmp_path / 'cache', 'output': tmp_path / 'out', 'nodes': 20, 'pairs': 5,
+        'draws': 2, 'builder-detector': 'none', 'builder-vocabulary': vocabulary,
+        'builder-detected-features': 60, 'lcd-min-gap-s': 0.1, 'lcd-map-window': 0,
+        'label-rule': 'distance', 'label-min-gap-s': 0.1}
+
+    def run(*more):
+        options = [text for name, value in settings.items() for text in (f'--{name}', str(value))]
+        return main(['targets', str(tmp_path / 'walk'), *options, *more])
+    return run
+
+
+def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
+    assert command('--targets', 'edges', 'vbow') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert [(row['protocol'], row['target']) for row in rows] == [
+        ('pairs', 'edges'), ('pairs', 'vbow'), ('live', 'edges'), ('live', 'vbow')]
+    pairs, live = rows[0], rows[2]
+    assert (pairs['n_pairs'], pairs['positives'], pairs['seeds']) == (20, 10, 2)
+    assert (live['n_frames'], live['positives'], live['negatives']) == (12, 6, 2)
+    # Each place is seen twice in nearly the same picture: matching cannot miss that.
+    assert pairs['average_precision'] == pytest.approx(1)
+    low, high = pairs['ci95']
+    assert 0 <= low <= pairs['balanced_accuracy'] <= high <= 1
+    assert '| walk | 20 | `edges` | 20 (10 loops) |' in capsys.readouterr().out
+
+
+def test_rows_that_are_there_are_not_made_again(tmp_path, command, capsys):
+    assert command('--targets', 'vbow') == 0
+    before = (tmp_path / 'out' / 'cells.jsonl').read_bytes()
+    assert command('--targets', 'vbow', '--protocols', 'live') == 0
+    assert '0 of 1 rows to make' in capsys.readouterr().err
+    assert (tmp_path / 'out' / 'cells.jsonl').read_bytes() == before
+
+
+def test_live_and_pairs_see_the_threshold(tmp_path, command):
+    assert command('--targets', 'edges', '--lcd-threshold', '0') == 0
+    for row in json.loads((tmp_path / 'out' / 'summary.json').read_text()):
+        assert row['recall'] == 1
+        assert row['balanced_accuracy'] == 0.5
+
+
+@pytest.mark.parametrize(('options', 'said'), [
+    (('--recipe', 'target'), 'either sequences or --recipe'),
+    (('--lcd-target', 'wl'), '--targets'),
+    (('--pairs', '0'), '--pairs 0: expected 1 or more')])
+def test_wrong_options_are_refused_in_one_line(command, capsys, options, said):
+    assert command(*options) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
+    one, two = tmp_path / 'one.yaml', tmp_path / 'two.yaml'
+    one.write_text('sequences:\n  - {source: a@0.5:1, nodes: [100, 300], lcd: {min_gap_s: 3}}\n'
+                   '  - {source: b, targets: [vbow]}\n')
+    first, second = recipe_sequences(str(one), tmp_path, Choices({}, {'candidates': 3}, {}))
+    assert first.source == str(tmp_path / 'a@0.5:1')
+    assert (first.nodes, first.lcd.min_gap_s, first.lcd.candidates) == ((100, 300), 3.0, 3)
+    assert (second.targets, second.nodes, second.lcd.min_gap_s) == (('vbow',), (300,), 8.0)
+    two.write_text('sequences:\n  - {source: b, target: vbow}\n')
+    with pytest.raises(ConfigError, match='unknown key target; there are: source'):
+        recipe_sequences(str(two), tmp_path, NOTHING)
+    with pytest.raises(ConfigError, match='there is no folder'):
+        recipe_sequences('target', tmp_path / 'nowhere', NOTHING)
+
+
+def test_the_recipe_that_ships_is_one(tmp_path):
+    sequences = recipe_sequences('target', tmp_path, NOTHING)
+    assert len({sequence.source for sequence in sequences}) == len(sequences) == 5
+
+
+@pytest.mark.parametrize(('source', 'seen'), [
+    ('x/flat_train', True), ('x/flat_tour', False), ('rgbd_dataset_freiburg1_rpy', True),
+    ('rgbd_dataset_freiburg1_rpy@0.5:1', False), ('rgbd_dataset_freiburg1_rpy@0.4:1', True)])
+def test_the_card_tells_what_was_trained_on(source, seen):
+    assert np.bool_(trained_on(source)) == seen
