@@ -192,7 +192,7 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
     from adversarial_lcd_ros.evaluation.sweep import kinds_of_cells
 
     table = Table('attack', 'frames', 'queries, ms', 'search, ms', 'judging, ms',
-                  title='Time a frame on one core')
+                  title='Processor time a frame')
     for kind, frames, seconds in kinds_of_cells(rows):
         table.add_row(kind, str(frames), *(f'{1e3 * part:.1f}' for part in seconds))
     console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)

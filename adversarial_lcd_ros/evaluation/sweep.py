@@ -30,10 +30,14 @@ from adversarial_lcd_ros.evaluation.workers import Run
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
-# Seconds on one core of the machine in docs/evaluation.md, a graph of 300 nodes: a query with
-# its share of surrogate and features, a frame, a flip scored by the yardstick. They only tell
-# how long it may take.
-_QUERY_S, _FRAME_S, _SCORE_S, _NODES = 0.6e-3, 0.03, 1e-6, 300
+# What takes how long, seconds on one core (docs/evaluation.md), by the target that is asked: a
+# query of a graph of 300 nodes, with its share of the search, and a flip scored by the yardstick.
+# They only tell how long a sweep may take.
+_QUERY_S = {'anchored': 0.9e-3, 'objects': 1.9e-3, '': 0.4e-3}
+_SCORE_S = {'anchored': 9e-6, 'objects': 2.7e-6, '': 0.3e-6}
+_FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
+# Recall groups flips, and does not spend its queries one by one.
+_RECALL_SHARE = 0.15
 
 Progress = Callable[[float, float], None]
 Row = dict[str, Any]
@@ -136,12 +140,12 @@ def _tasks(stream: Stream, named: Sequence[tuple[str, Cell]], lcd: LcdConfig,
     for per_kind in dict.fromkeys(cell.frames for _, cell in named):
         sample = sample_frames(stream.labels, per_kind, seed)
         part: list[tuple[str, Cell]] = []
-        cost_s = 0.0
+        cost_s = _WALK_S
         for entry in (entry for entry in named if entry[1].frames == per_kind):
             extra_s = len(sample.frame) * _expected_s(entry[1], stream.nodes_mean)
             if part and cost_s + extra_s > _TASK_S:
                 yield _task(stream, sample, part, lcd, seed, cost_s)
-                part, cost_s = [], 0.0
+                part, cost_s = [], _WALK_S
             part.append(entry)
             cost_s += extra_s
         if part:
@@ -158,10 +162,13 @@ def _expected_s(cell: Cell, nodes: float) -> float:
     """Return about how long a frame takes on one core, if the attack spends its budget."""
     edits = edit_budget(round(nodes), cell.attack.ratio)
     if cell.perturbation == Optimum.name:
-        return _FRAME_S + edits * nodes * nodes / 2 * _SCORE_S
+        return _FRAME_S + edits * nodes * nodes / 2 * _SCORE_S.get(cell.target, _SCORE_S[''])
     queries = min(edits * cell.attack.queries_per_edit, cell.attack.max_queries)
-    asked = queries if cell.attack.mode == 'query' else 0
-    return _FRAME_S + asked * _QUERY_S * nodes / _NODES
+    asked = float(queries) if cell.attack.mode == 'query' else 0.0
+    if cell.perturbation == 'recall':
+        asked *= _RECALL_SHARE
+    query_s = _QUERY_S.get(cell.asked_target, _QUERY_S[''])
+    return _FRAME_S + asked * query_s * nodes / _NODES
 
 
 def run_sweep(sweep: Sweep, store: CellStore, run: Run, progress: Progress) -> list[Row]:
