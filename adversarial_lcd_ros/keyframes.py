@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import chain
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -118,35 +116,39 @@ class Database:
 
         """
         query = self._query(graph)
-        bound = np.concatenate([np.zeros(0), *(block.bounds(query) for block in self._blocks)])
-        bound[~admissible] = -1
-        score = np.where(bound == 0, 0.0, -1.0)
+        level = np.concatenate([np.zeros(0, np.uint32),
+                                *(block.levels(query) for block in self._blocks)])
+        level[~admissible] = 0
+        unlike = np.flatnonzero(admissible & (level == 0))
+        ranked, score, chosen = np.zeros(0, np.int64), np.zeros(0), list[int]()
         # Each one chosen rules out 2 window others: among so many are enough.
-        worst = _largest(bound, max(LEAST_SCORED, count * (2 * window + 1)))
-        while True:
-            doubtful = np.flatnonzero((score < 0) & (bound >= max(worst, 0)))
-            score[doubtful] = self._scores(query, doubtful)
-            chosen = _spread(score, count, window)
-            if not len(doubtful):
-                return chosen, score[chosen].tolist()
-            worst = score[chosen[-1]] if len(chosen) == count else 0.0
+        cut = _largest(level, max(LEAST_SCORED, count * (2 * window + 1)))
+        while len(new := np.flatnonzero(level >= cut)):
+            level[new] = 0
+            ranked, score = np.append(ranked, new), np.append(score, self._scores(query, new))
+            order = np.lexsort((ranked, -score))
+            ranked, score = ranked[order], score[order]
+            chosen = _spread(ranked, count, window)
+            cut = query.least_level(score[chosen[-1]]) if len(chosen) == count else 1
+        if len(chosen) < count:
+            ranked, score = np.append(ranked, unlike), np.append(score, np.zeros(len(unlike)))
+            chosen = _spread(ranked, count, window)
+        return ranked[chosen].tolist(), score[chosen].tolist()
 
 
-def _largest(values: NDArray[np.float64], count: int) -> float:
-    """Return the count-th largest value; 0 if there are fewer."""
-    return float(np.partition(values, -count)[-count]) if len(values) > count else 0.0
+def _largest(level: NDArray[np.uint32], count: int) -> int:
+    """Return the count-th largest level; 1 if there are fewer above 0."""
+    return max(1, int(np.partition(level, -count)[-count])) if len(level) > count else 1
 
 
-def _spread(score: NDArray[np.float64], count: int, window: int) -> list[int]:
-    """Return indices by falling score, at least 0, none within the window of one before it."""
-    alike = np.flatnonzero(score > 0)
-    alike = alike[np.argsort(-score[alike], kind='stable')]
-    free = np.ones(len(score), np.bool_)
+def _spread(ranked: NDArray[np.int64], count: int, window: int) -> list[int]:
+    """Return the first places whose keyframes are not within the window of one before them."""
+    taken: set[int] = set()
     chosen: list[int] = []
-    for index in chain(alike, np.flatnonzero(score == 0)):
-        if len(chosen) == count:
-            break
-        if free[index]:
-            chosen.append(int(index))
-            free[max(0, index - window):index + window + 1] = False
+    for place, keyframe in enumerate(map(int, ranked)):
+        if keyframe not in taken:
+            chosen.append(place)
+            taken.update(range(keyframe - window, keyframe + window + 1))
+            if len(chosen) == count:
+                break
     return chosen

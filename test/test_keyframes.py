@@ -21,15 +21,18 @@ def with_words(words):
     return replace(PLAIN, word=word, word_weight=weight)
 
 
-# Few words and few weights, so that scores tie; more words than columns; any weight at all.
-FEW = st.dictionaries(st.integers(0, 6), st.sampled_from([0.0, 2.0 ** -13, 0.1, 0.2]), max_size=6)
+# Multiples of 2^-20: their sums are the same in any order. Few words and few weights, so that
+# scores tie; words of any size, more of them than columns, also with weights beyond the levels.
+FEW = st.dictionaries(st.integers(0, 6), st.sampled_from([0.0, 2.0 ** -13, 0.25, 2.0 ** -20]),
+                      max_size=6)
 ANY = st.dictionaries(st.integers(0, 2**32 - 1) | st.integers(0, 40),
-                      st.floats(0, 2, width=32) | st.floats(0, 2.0 ** -12, width=32), max_size=40)
+                      (st.integers(0, 2**21) | st.integers(0, 2**8)).map(lambda k: k * 2.0 ** -20),
+                      max_size=40)
 VECTORS = (st.lists(words.map(with_words), min_size=1, max_size=12) for words in (FEW, ANY))
 
 
 def score_of(a, b):
-    """Return the sum of the smaller weights, added up by ascending word."""
+    """Return the sum of the smaller weights."""
     weight = dict(zip(a.word.tolist(), a.word_weight.tolist(), strict=True))
     return sum((min(value, weight.get(word, 0.0)) for word, value in
                 zip(b.word.tolist(), b.word_weight.tolist(), strict=True)), 0.0)
