@@ -78,6 +78,22 @@ def _exact(start: NDArray[np.int64], number: NDArray[np.uint32], weight: NDArray
     return score
 
 
+@compiled
+def common_weight(a: NDArray[np.uint32], weight_a: NDArray[np.float32], b: NDArray[np.uint32],
+                  weight_b: NDArray[np.float32]) -> float:
+    """Return sum of the smaller weights over the words, ascending, that both have."""
+    total = 0.0
+    i, j = 0, 0
+    while i < len(a) and j < len(b):
+        if a[i] == b[j]:
+            total += min(weight_a[i], weight_b[j])
+        # Without branches: which list is ahead cannot be foretold.
+        behind = int(a[i] <= b[j])
+        j += int(b[j] <= a[i])
+        i += behind
+    return total
+
+
 class Query:
     """
     The vBoW vector of a query, laid out for blocks.

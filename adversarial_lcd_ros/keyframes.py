@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.keyframe_blocks import KEYFRAMES, Block, Query
+from adversarial_lcd_ros.keyframe_blocks import KEYFRAMES, Block, Query, common_weight
 
 # Scored at once, the best bounds first.
 LEAST_SCORED = 64
@@ -18,8 +18,7 @@ def bow_score(a: MultiTierGraph, b: MultiTierGraph) -> float:
 
     1 - |a - b|_1 / 2 of L1-normalised vectors, which is the sum of the smaller weights.
     """
-    _, in_a, in_b = np.intersect1d(a.word, b.word, assume_unique=True, return_indices=True)
-    return float(np.minimum(a.word_weight[in_a], b.word_weight[in_b]).sum())
+    return float(common_weight(a.word, a.word_weight, b.word, b.word_weight))
 
 
 class Database:

@@ -118,15 +118,12 @@ class Comparison:
 
     def __init__(self, query: View, references: Sequence[View]) -> None:
         self.references = list(references)
-        self.matches = [match_nodes(query, reference) for reference in references]
         self.features = np.array([view.features for view in references], np.int64)
         self.objects = np.array([view.objects for view in references], np.int64)
         self.edges = np.array([view.graph.edge_count for view in references], np.int64)
+        self._query = query
         self._query_nodes = query.graph.node_count
         self._query_labels = query.graph.label[:query.objects]
-        nodes = _join([match.query for match in self.matches], np.int64)
-        self._order = np.argsort(nodes, kind='stable')
-        self.match_query = nodes[self._order]
 
     def __len__(self) -> int:
         """Return the number of references, r."""
@@ -137,6 +134,24 @@ class Comparison:
         """Return the sum of the values of each reference, shape (r,)."""
         sums: NDArray[np.float64] = kernels.total_by_owner(owner, value, len(self))
         return sums
+
+    @cached_property
+    def matches(self) -> list[NodeMatch]:
+        """Matches with each reference; targets without features need none."""
+        return [match_nodes(self._query, reference) for reference in self.references]
+
+    @cached_property
+    def _matched(self) -> NDArray[np.int64]:
+        return _join([match.query for match in self.matches], np.int64)
+
+    @cached_property
+    def _order(self) -> NDArray[np.int64]:
+        return np.argsort(self._matched, kind='stable')
+
+    @cached_property
+    def match_query(self) -> NDArray[np.int64]:
+        """Query node of each matched feature, ascending, shape (k,)."""
+        return self._matched[self._order]
 
     @cached_property
     def match_start(self) -> NDArray[np.int64]:
