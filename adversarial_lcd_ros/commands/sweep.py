@@ -57,7 +57,9 @@ def run(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.cell_store import open_store
     from adversarial_lcd_ros.evaluation.frame_recipes import load_cells
     from adversarial_lcd_ros.evaluation.paper_report import write_paper_report
+    from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.sweep import plan_sweep, run_sweep
+    from adversarial_lcd_ros.evaluation.sweep_pictures import sweep_pictures
 
     started = time.monotonic()
     _check(options)
@@ -76,6 +78,7 @@ def run(options: Namespace) -> None:
             tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
                  'there')
             raise
+        write_pictures(folder, sweep_pictures(streams, cells, rows, lcd))
         report = write_paper_report(folder, rows)
     _conclude(rows, time.monotonic() - started, report)
 
