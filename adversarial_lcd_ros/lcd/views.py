@@ -38,13 +38,14 @@ class View:
         self.graph = graph
         self.objects: int = same_nodes.objects if same_nodes else graph.object_count
         self.features = graph.node_count - self.objects
-        if same_nodes:
-            self.x0 = same_nodes.x0
+        self._same_nodes = same_nodes
 
     @cached_property
     def x0(self) -> NDArray[np.int8]:
         """Initial node features: descriptor bits as +-1, zero for objects, shape (n, 256)."""
-        rows = np.zeros((self.graph.node_count, _BITS), np.int8)
+        if self._same_nodes:
+            return self._same_nodes.x0
+        rows: NDArray[np.int8] = np.zeros((self.graph.node_count, _BITS), np.int8)
         bits = np.unpackbits(self.graph.descriptor[self.objects:], axis=1)
         rows[self.objects:] = 2 * bits.astype(np.int8) - 1
         return rows
