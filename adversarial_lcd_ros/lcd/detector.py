@@ -135,7 +135,9 @@ class LoopClosureDetector:
             graph, old, self.config.candidates, self.config.map_window)
         around = [self._window(candidate, old) for candidate in candidates]
         keyframes = sorted({keyframe for window in around for keyframe in window})
-        average = np.array([np.isin(keyframes, window) / len(window) for window in around])
+        average = np.zeros((len(around), len(keyframes)))
+        for row, window in zip(average, around, strict=True):
+            row[np.searchsorted(keyframes, window)] = 1 / len(window)
         query = View(graph)
         comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
         return QueryNodes(key, query, candidates, bow, average, comparison,
