@@ -65,6 +65,9 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         'others from its clean graphs)')
     parser.add_argument('--keep-recordings', action='store_true',
                         help='keep all graphs and decisions, as bags, in the results folder')
+    parser.add_argument('--sweep-labels', action='store_true',
+                        help='show whether the conclusion hangs on the thresholds of the labels '
+                        '(also label_sweep.csv)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
     for config_class, prefix in EVALUATED:
@@ -96,7 +99,7 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
 
     from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
     from adversarial_lcd_ros.evaluation.recipes import load_recipe
-    from adversarial_lcd_ros.evaluation.tables import decline_table, figure_table
+    from adversarial_lcd_ros.evaluation.tables import decline_table, figure_table, sweep_table
     from adversarial_lcd_ros.evaluation.wording import headline
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
@@ -105,13 +108,15 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW),
                         **chosen_settings(options, ReplayConfig)),
-                attacks, rebuild=options.rebuild)
+                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
                                     keep_recordings=options.keep_recordings)
     # Where there is no terminal there is no width to keep to.
     console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
     console.print(figure_table(summary))
     console.print(decline_table(summary))
+    if options.sweep_labels:
+        console.print(sweep_table(summary))
     console.print(headline(summary), soft_wrap=True)
     console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
                   soft_wrap=True)

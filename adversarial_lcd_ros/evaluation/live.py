@@ -26,6 +26,7 @@ from adversarial_lcd_ros.evaluation.graph_sequences import (
     holds_graphs,
     open_graphs,
 )
+from adversarial_lcd_ros.evaluation.label_sweep import SWEEP, sweep_labels, write_sweep
 from adversarial_lcd_ros.evaluation.labels import label_frames
 from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
 from adversarial_lcd_ros.evaluation.pipeline import Recording, Setup, run_pipeline
@@ -69,6 +70,8 @@ class Plan:
         whether the graphs come out the same, and the others start from the graphs of that run.
     seed : int
         Of the bootstrap.
+    sweep_labels : bool
+        Label the decisions with other thresholds, too.
 
     """
 
@@ -79,6 +82,7 @@ class Plan:
     attacks: Mapping[str, AttackConfig]
     rebuild: bool = False
     seed: int = 42
+    sweep_labels: bool = False
 
 
 def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence[str] = (),
@@ -131,6 +135,11 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         plan.seed)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
+    if plan.sweep_labels:
+        tell('labels with other thresholds')
+        summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
+                                              plan.labels)
+        write_sweep(folder.path / SWEEP, summary['label_sweep'])
     summary['duration_s'] = time.monotonic() - started_s
     _write(folder, plan, summary, records, command_line,
            _pictures(sequence, clean, runs, records, summary))

@@ -22,6 +22,17 @@ def figure_table(summary: Mapping[str, Any]) -> Table:
     return _table(f'The detector on {summary["sequence"]}', wording.figure_rows(summary))
 
 
+def sweep_table(summary: Mapping[str, Any]) -> Table:
+    """Return what each run would be worth by other labels."""
+    rows = [{'labels': row['labels'], 'run': row['run'],
+             'loops / new places': f'{row["positives"]} / {row["negatives"]}',
+             'balanced': wording.percent(row['balanced_accuracy']),
+             'decline, points': wording.number(row['decline_pp']),
+             'suppressed': str(row['suppressed']), 'invented': str(row['invented'])}
+            for row in summary['label_sweep']]
+    return _table('The same decisions by other labels', rows)
+
+
 def _table(title: str, rows: Sequence[Mapping[str, str]]) -> Table:
     table = Table(title=title, title_justify='left')
     for index, heading in enumerate(rows[0] if rows else ()):
