@@ -53,6 +53,7 @@ class GraphBuilderNode(PipelineNode):
 
     default_name = 'graph_builder'
     configs = NODE_CONFIGS['graph_builder']
+    wakes_itself = True
     manual = Manual(
         'camera frames to multi-tier graphs of objects and visual features',
         subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',

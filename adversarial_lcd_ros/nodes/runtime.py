@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+import importlib
+import importlib.util
 import signal
 import sys
 from threading import Event
@@ -53,6 +55,11 @@ class PipelineNode(Node):  # type: ignore[misc]
     options
         Of ``rclpy.node.Node``: context, parameter_overrides, use_global_arguments, namespace.
 
+    Attributes
+    ----------
+    wakes_itself : bool
+        It has guard conditions, and needs an executor that knows of them.
+
     Raises
     ------
     ConfigError
@@ -63,6 +70,7 @@ class PipelineNode(Node):  # type: ignore[misc]
     default_name: ClassVar[str]
     manual: ClassVar[Manual]
     configs: ClassVar[tuple[type[Config], ...]]
+    wakes_itself: ClassVar[bool] = False
 
     def __init__(self, **options: Any) -> None:
         super().__init__(self.default_name, automatically_declare_parameters_from_overrides=True,
@@ -123,7 +131,7 @@ def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) 
 
 def _live(node_class: type[PipelineNode], context: Context, stop: Event) -> int:
     node = node_class(context=context)
-    executor = SingleThreadedExecutor(context=context)
+    executor = make_executor(context, node_class.wakes_itself)
     executor.add_node(node)
     try:
         # The nodes of a pipeline share the cores. BLAS threads that wait spinning for a core
@@ -136,6 +144,21 @@ def _live(node_class: type[PipelineNode], context: Context, stop: Event) -> int:
         node.close()
         executor.shutdown()
         node.destroy_node()
+
+
+def make_executor(context: Context, guard_conditions: bool = False) -> Executor:
+    """
+    Return what runs callbacks in one thread.
+
+    Rclpy's executor of events, where this release has it: the other one lists in Python all that
+    there is to wait for, each time anew, which takes it longer than most callbacks here. The one
+    of events has no guard conditions.
+    """
+    if guard_conditions or importlib.util.find_spec('rclpy.experimental') is None:
+        return SingleThreadedExecutor(context=context)
+    events = importlib.import_module('rclpy.experimental.events_executor')
+    executor: Executor = events.EventsExecutor(context=context)
+    return executor
 
 
 def _spin(executor: Executor, stop: Event, seconds: float) -> bool:
