@@ -63,6 +63,16 @@ def test_settings_of_the_command_line_win(tmp_path, command):
     assert (entry['perturbation'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
 
 
+def test_cells_of_other_settings_are_kept_and_not_reported(tmp_path, command, capsys):
+    for candidates in ('5', '4'):
+        assert command('--perturbation', 'optimum', '--seeds', '1', '--lcd-candidates',
+                       candidates) == 0
+    assert 'models or code: 1;' in capsys.readouterr().err
+    assert len((tmp_path / 'out' / 'cells.jsonl').read_text().splitlines()) == 2
+    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert entry['seeds'] == 1
+
+
 def test_an_interruption_says_that_nothing_is_lost(tmp_path, command, capsys, monkeypatch):
     def interrupted(function, tasks):
         yield function(tasks[0])

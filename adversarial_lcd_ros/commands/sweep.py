@@ -70,7 +70,7 @@ def run(options: Namespace) -> None:
         streams = _open(options, sorted({cell.nodes for cell in cells}))
         sweep = plan_sweep(streams, cells, lcd, list(store.rows))
         _write_setup(folder, options, streams, [asdict(cell) for cell in cells])
-        _announce(options, streams, sweep)
+        _announce(options, streams, sweep, len(store.rows) - sweep.finished)
         try:
             with _workers(options) as workers, _bar(sweep) as progress:
                 rows = run_sweep(sweep, store, workers, progress)
@@ -148,10 +148,13 @@ def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
     results.write_json(f'{Path(ENVIRONMENT).stem}-{versions_digest()}.json', environment())
 
 
-def _announce(options: Namespace, streams: list[Stream], sweep: Sweep) -> None:
+def _announce(options: Namespace, streams: list[Stream], sweep: Sweep, others: int) -> None:
     for stream in {stream.name: stream for stream in streams}.values():
         tell(f'{stream.name}: {stream.labels.count("positive")} frames with a loop, '
              f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}')
+    if others:
+        tell(f'cells finished earlier that are of other settings, graphs, models or code: {others}; '
+             'kept, but not in the report')
     left = len(sweep.keys) - sweep.finished
     where = (f'the workers of {options.scheduler}: {sweep.cost_s / 60:.0f} min of one core'
              if options.scheduler else
