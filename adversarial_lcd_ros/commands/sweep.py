@@ -153,8 +153,8 @@ def _announce(options: Namespace, streams: list[Stream], sweep: Sweep, others: i
         tell(f'{stream.name}: {stream.labels.count("positive")} frames with a loop, '
              f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}')
     if others:
-        tell(f'cells finished earlier that are of other settings, graphs, models or code: {others}; '
-             'kept, but not in the report')
+        tell('cells finished earlier that are of other settings, graphs, models or code: '
+             f'{others}; kept, but not in the report')
     left = len(sweep.keys) - sweep.finished
     where = (f'the workers of {options.scheduler}: {sweep.cost_s / 60:.0f} min of one core'
              if options.scheduler else
