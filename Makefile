@@ -1,5 +1,6 @@
 # make demo: attack loop closure detection on the embedded tour; report in results/latest
 # make paper: the paper's experiments over the sequences in DATA; report in results/paper
+# make target: the detectors before any attack, on the sequences in DATA; tables in results/target
 # make test, make lint, make bench, make clean
 #
 # The first target sets up .venv and the object model; after that nothing is downloaded or built.
@@ -20,7 +21,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo paper test lint bench clean setup model
+.PHONY: demo paper target test lint bench clean setup model
 .DEFAULT_GOAL := demo
 
 demo: model
@@ -32,6 +33,9 @@ paper: model
 	  "error: there is no $(DATA)/$${sequence%@*}; make paper DATA=FOLDER, or PAPER='NAME ...' for others" \
 	  >&2; exit 1; }; done
 	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper --output results/paper $(ARGS)
+
+target: model
+	$(BIN)/adversarial-lcd targets --recipe target --data $(DATA) --output results/target $(ARGS)
 
 test: model
 	$(BIN)/python -m pytest -n 2 $(ARGS)

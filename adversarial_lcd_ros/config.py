@@ -14,7 +14,7 @@ from typing import Any, ClassVar, TypeVar
 
 from adversarial_lcd_ros.errors import ConfigError
 
-TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow', 'objects')
+TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow', 'objects', 'wl_exact', 'gnn')
 PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
 SURROGATES = ('svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes', 'svr', 'ard', 'none')
 MODES = ('query', 'surrogate', 'pass')
@@ -141,6 +141,13 @@ class LcdConfig(Config):
         'before and after it.', low=0, high=20)
     threshold: float = setting(
         0.5, 'A loop closure is declared from this probability on.', low=0.0, high=1.0)
+    geometric_check: bool = setting(
+        False, 'Declare a loop only if the features of both frames agree on one camera motion.')
+    geometric_inliers: int = setting(
+        20, 'Geometric check: least matches that agree.', low=8, high=100_000)
+    geometric_threshold_px: float = setting(
+        3.0, 'Geometric check: largest distance of a match from its epipolar line, pixels.',
+        low=0.01, high=1000.0)
     hard_answers: bool = setting(
         False, 'Answer queries with the decision only, not with the probability.')
     max_keyframes: int = setting(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 import json
+import shutil
 
 from graph_factory import flips_of, graphs, make_graph
 from hypothesis import given, settings
@@ -17,7 +18,9 @@ from adversarial_lcd_ros.keyframes import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS, make_target, prepare
+from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
 from adversarial_lcd_ros.lcd.views import Comparison, View
+from adversarial_lcd_ros.paths import model_path
 
 GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),
                         *((k, k + 1) for k in range(2, 39))], objects=2)
@@ -30,6 +33,8 @@ def model(tmp_path):
         channels = TARGETS[target].channels
         path = tmp_path / f'{target}.json'
         Decision(target, channels, (10.0,) * len(channels), -10.0).save(path)
+        if target == 'gnn':
+            shutil.copy(model_path(NETWORK), path.with_suffix('.onnx'))
         return str(path)
     return write
 
@@ -230,6 +235,28 @@ def test_hard_answers_tell_the_decision_only(model):
     assert answer.probability in (0.0, 1.0)
 
 
+def moved(graph, seconds, shift):
+    """Return what a graph's features look like from elsewhere: each moved by a vector."""
+    return replace(graph, stamp_ns=seconds * 10**9, position=graph.position + np.float32(shift))
+
+
+def test_the_geometric_check_wants_one_motion_for_all_features(model):
+    def decide(graph, **settings):
+        detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, map_window=0,
+                                                 threshold=0.4, **settings))
+        detector.detect(at(0))
+        return detector.judge(graph)
+
+    nodes = len(at(0).position)
+    steady = moved(at(0), 9, [4, 2])
+    torn = moved(at(0), 9, np.random.default_rng(0).uniform(-200, 200, (nodes, 2)))
+    assert decide(torn).is_loop
+    assert decide(torn, geometric_check=True, geometric_inliers=18).probability < 0.4
+    checked = decide(steady, geometric_check=True, geometric_inliers=18)
+    assert checked == decide(steady)
+    assert checked.is_loop
+
+
 def test_a_full_database_goes_on_judging(model):
     detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, max_keyframes=1))
     detector.detect(at(0))
@@ -265,3 +292,25 @@ def test_probability_of_extreme_odds():
     assert probability(-1000) == 0
     assert probability(1000) == 1
     assert probability(0) == 0.5
+
+
+def test_exact_labels_of_one_differing_word_count_for_nothing():
+    query = make_graph(3, [(0, 1), (1, 2)], objects=1, label=np.array([5, 7, 9], np.uint32))
+    other = replace(query, label=np.array([5, 7, 8], np.uint32))
+    # At iteration 0 two labels of three recur; at 1 only the object's, whose neighbour recurs.
+    assert scores('wl_exact', query, query)['labels'] == pytest.approx(1)
+    assert scores('wl_exact', query, other)['labels'] == pytest.approx(3 / 6)
+    # An object of class 7 is not a feature of word 7.
+    swapped = make_graph(3, [(0, 1), (1, 2)], objects=1, label=np.array([7, 5, 9], np.uint32))
+    assert scores('wl_exact', query, swapped)['labels'] == pytest.approx(1 / 6)
+
+
+def test_the_network_sees_edges_and_a_damaged_one_is_refused(tmp_path):
+    whole = scores('gnn', GRAPH, GRAPH)['matches']
+    assert whole == pytest.approx(np.sqrt(0.6), abs=1e-5)
+    assert scores('gnn', GRAPH.flip([(2, 3), (4, 30)]), GRAPH)['matches'] < whole - 1e-4
+    (tmp_path / 'gnn.onnx').write_bytes(b'no network')
+    with pytest.raises(ModelError, match='is no network'):
+        make_target('gnn', tmp_path / 'gnn.onnx')
+    with pytest.raises(ModelError, match='is no network'):
+        make_target('gnn', tmp_path / 'missing.onnx')

@@ -117,7 +117,8 @@ def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTa
     from adversarial_lcd_ros.evaluation.target_run import TargetTask
 
     seeds = tuple(range(options.seed, options.seed + options.draws))
-    return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds)
+    return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds,
+                       sequence.scored)
             for sequence in sequences for stream in _streams(sequence, options.cache)
             for protocol in options.protocols for target in sequence.targets]
 

@@ -24,9 +24,9 @@ def add(commands: Commands) -> None:
                         help='where the artefacts and their card go (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=42, metavar='N',
                         help='seed of every random choice (default: %(default)s)')
-    parser.add_argument('--targets', nargs='+', choices=TARGETS, default=TARGETS, metavar='NAME',
+    parser.add_argument('--targets', nargs='+', choices=TARGETS, metavar='NAME',
                         help='targets to train; the first answers the queries of the surrogate '
-                        f'data (default: {" ".join(TARGETS)})')
+                        'data (default: all but gnn, which needs PyTorch)')
     parser.add_argument('--vocabulary', type=Path, metavar='FILE',
                         help='use this vocabulary (npz) instead of training one')
     parser.add_argument('--vocabulary-stride', type=int, default=2, metavar='N',
@@ -48,7 +48,12 @@ def add(commands: Commands) -> None:
 
 
 def _train(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.training_run import TRAINING_LABELS, TrainingPlan, train
+    from adversarial_lcd_ros.evaluation.training_run import (
+        DEFAULT_TARGETS,
+        TRAINING_LABELS,
+        TrainingPlan,
+        train,
+    )
     from adversarial_lcd_ros.evaluation.training_sources import TrainingSource, with_licences
 
     sources = with_licences([TrainingSource.parse(text) for text in options.sequences],
@@ -59,7 +64,7 @@ def _train(options: Namespace) -> None:
     plan = TrainingPlan(
         builder, config_from_options(options, LcdConfig),
         replace(TRAINING_LABELS, **chosen_settings(options, LabelConfig)),
-        tuple(options.targets), options.pairs, options.vocabulary_stride,
+        tuple(options.targets or DEFAULT_TARGETS), options.pairs, options.vocabulary_stride,
         flips_per_frame=options.flips_per_frame)
     card = train(sources, options.output, seed=options.seed, plan=plan, stage=progress_bar,
                  overwrite=options.overwrite, command_line=['adversarial-lcd', *sys.argv[1:]])

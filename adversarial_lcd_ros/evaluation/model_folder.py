@@ -12,13 +12,18 @@ from typing import Any
 from adversarial_lcd_ros.errors import ModelError
 
 VOCABULARY, SURROGATE_DATA, MODEL_CARD = 'vocabulary.npz', 'surrogate_data.npz', 'MODEL_CARD.json'
-_TARGET = 'target_{}.json'
-_OURS = (VOCABULARY, SURROGATE_DATA, MODEL_CARD, _TARGET.format('*'))
+_TARGET, _NETWORK = 'target_{}.json', 'target_{}.onnx'
+_OURS = (VOCABULARY, SURROGATE_DATA, MODEL_CARD, _TARGET.format('*'), _NETWORK.format('*'))
 
 
 def decision_file(target: str) -> str:
     """Return the name of the file with the decision of a target."""
     return _TARGET.format(target)
+
+
+def network_file(target: str) -> str:
+    """Return the name of the file with the network of a target that has one."""
+    return _NETWORK.format(target)
 
 
 @contextmanager

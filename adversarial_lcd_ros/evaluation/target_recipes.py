@@ -14,7 +14,7 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.recipes import find_recipe
 
 ConfigT = TypeVar('ConfigT', bound=Config)
-_KEYS = ('source', 'nodes', 'targets', 'builder', 'lcd', 'labels')
+_KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels')
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class TargetSequence:
     nodes : tuple of int
         Features of a graph.
     targets : tuple of str
+    scored : (float, float)
+        From and to which fraction of the frames queries are scored; earlier ones are map only.
 
     """
 
@@ -40,6 +42,7 @@ class TargetSequence:
     labels: LabelConfig
     nodes: tuple[int, ...]
     targets: tuple[str, ...]
+    scored: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,15 @@ def _sequence(source: str, entry: Mapping[str, Any], choices: Choices) -> Target
                           f'{", ".join(TARGETS)}')
     return TargetSequence(source, builder, _merged(LcdConfig, entry.get('lcd'), choices.lcd),
                           _merged(LabelConfig, entry.get('labels'), choices.labels), nodes,
-                          targets)
+                          targets, _part(source, entry.get('scored', (0, 1))))
+
+
+def _part(source: str, value: Any) -> tuple[float, float]:
+    if not (isinstance(value, (list, tuple)) and len(value) == 2
+            and all(isinstance(end, (int, float)) for end in value)
+            and 0 <= value[0] < value[1] <= 1):
+        raise ConfigError(f'{source}: scored {value!r}: expected a part, such as [0.5, 1]')
+    return float(value[0]), float(value[1])
 
 
 def _merged(config: type[ConfigT], own: Any, chosen: Mapping[str, Any]) -> ConfigT:

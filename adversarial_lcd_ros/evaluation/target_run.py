@@ -57,6 +57,8 @@ class TargetTask:
         Most loops, and as many pairs of different places, of a draw.
     seeds : tuple of int
         One draw of pairs each.
+    scored : (float, float)
+        From and to which fraction of the frames queries are scored; the others are map only.
 
     """
 
@@ -66,13 +68,15 @@ class TargetTask:
     lcd: LcdConfig
     pairs: int
     seeds: tuple[int, ...]
+    scored: tuple[float, float] = (0.0, 1.0)
 
     @property
     def key(self) -> str:
         """Digest of all that the figures depend on, hexadecimal."""
         values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
-                  'model': file_digest(self._model), 'seeds': self.seeds}
+                  'model': file_digest(self._model), 'seeds': self.seeds,
+                  'scored': self.scored}
         if self.protocol == 'pairs':
             values['pairs'] = self.pairs
         return digest_of(json.dumps(values, sort_keys=True).encode())
@@ -86,6 +90,17 @@ class TargetTask:
         target = make_target(self.target)
         return Decision.load(self._model, target.name, target.channels)
 
+    def labels(self) -> FrameLabels:
+        """Return the labels, without queries outside the part that is scored."""
+        labels = self.stream.labels
+        frames = len(labels.kind)
+        outside = np.ones(frames, bool)
+        outside[int(frames * self.scored[0]):int(frames * self.scored[1])] = False
+        relation = np.tril(labels.relation, -1)
+        relation[outside] = 0
+        return replace(labels, relation=relation,
+                       kind=np.where(outside, 0, labels.kind).astype(np.int8))
+
 
 def run_target(task: TargetTask) -> tuple[str, Row]:
     """
@@ -94,37 +109,35 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     The row has ``sequence, target, protocol, nodes, nodes_mean, frames, positives, negatives,
     trained_on, balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc,
     precision, recall``, and ``n_pairs, seeds`` or ``n_frames, latency_to_first_closure_s``.
-    Undefined figures are None.
-
-    Raises
-    ------
-    EvaluationError
-        The sequence has no pair of a class.
-
+    Undefined figures are None, so all of a sequence without pairs of a class.
     """
     figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
     stream = task.stream
     return task.key, {
         'sequence': stream.name, 'target': task.target, 'protocol': task.protocol,
         'nodes': stream.nodes, 'nodes_mean': stream.nodes_mean,
-        'frames': len(stream.labels.kind), 'trained_on': trained_on(stream.graphs.source),
-        **figures}
+        'frames': len(stream.labels.kind), 'scored': list(task.scored),
+        'trained_on': trained_on(stream.graphs.source, task.scored), **figures}
 
 
-def trained_on(source: str) -> bool:
-    """Tell whether the models that ship were trained on frames of a source, by their card."""
+def trained_on(source: str, scored: tuple[float, float] = (0.0, 1.0)) -> bool:
+    """Tell by their card whether the models that ship were trained on scored frames."""
     part = TrainingSource.parse(source)
+    length = part.stop - part.start
+    start, stop = (part.start + length * end for end in scored)
     card = json.loads(model_path('MODEL_CARD.json').read_text(encoding='utf-8'))
     name = part.path.resolve().stem
-    return any(entry['name'] == name and entry['part'][0] < part.stop
-               and part.start < entry['part'][1] for entry in card['sequences'])
+    return any(entry['name'] == name and entry['part'][0] < stop
+               and start < entry['part'][1] for entry in card['sequences'])
 
 
 def _pairs(task: TargetTask) -> Row:
-    labels, decision = task.stream.labels, task.decision()
+    labels, decision = task.labels(), task.decision()
     graphs = load_stream_graphs(task.stream.graphs)
-    lower = np.tril(labels.relation, -1)
-    count = min(task.pairs, *(int((lower == value).sum()) for value in (POSITIVE, NEGATIVE)))
+    count = min(task.pairs, *(int((labels.relation == value).sum())
+                              for value in (POSITIVE, NEGATIVE)))
+    if not count:
+        return {**_figures(None), 'n_pairs': 0, 'seeds': 0, 'ci95': None}
     scorer = PairScorer(make_target(task.target), graphs, task.lcd.map_window)
     query, is_loop, logit = [], [], []
     for seed in task.seeds:
@@ -156,7 +169,7 @@ def _pair_interval(labels: FrameLabels, query: NDArray[np.int64], kind: NDArray[
 
 
 def _live(task: TargetTask) -> Row:
-    labels = task.stream.labels
+    labels = task.labels()
     run, _ = run_offline(load_stream_graphs(task.stream.graphs),
                          replace(task.lcd, target=task.target))
     frame_of = {int(stamp): frame for frame, stamp in enumerate(labels.stamp_ns)}
@@ -175,7 +188,7 @@ def _live(task: TargetTask) -> Row:
                 labels.stamp_ns, labels.kind, outcome)}
 
 
-def _figures(metrics: Metrics) -> Row:
-    return {name: getattr(metrics, name) for name in (
+def _figures(metrics: Metrics | None) -> Row:
+    return {name: getattr(metrics, name, None) for name in (
         'positives', 'negatives', 'balanced_accuracy', 'average_precision',
         'recall_at_100_precision', 'mcc', 'precision', 'recall')}

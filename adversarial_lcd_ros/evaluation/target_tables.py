@@ -38,7 +38,11 @@ def target_tables(rows: Iterable[Row]) -> str:
 def _group_lines(group: Sequence[Row]) -> list[str]:
     lines = []
     for place, row in enumerate(group):
-        name = row['sequence'] + (' (seen in training)' if row['trained_on'] else '')
+        name = row['sequence']
+        if row['scored'] != [0, 1]:
+            name += f', scored from {row["scored"][0]:g} to {row["scored"][1]:g}'
+        if row['trained_on']:
+            name += ' (seen in training)'
         first = (name, f'{row["nodes_mean"]:.0f}') if not place else ('', '')
         lines.append(_line((*first, f'`{row["target"]}`', *_cells(row))))
     return lines

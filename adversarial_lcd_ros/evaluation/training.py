@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,11 +16,13 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.gnn_training import train_gnn
 from adversarial_lcd_ros.evaluation.labels import label_frames
 from adversarial_lcd_ros.evaluation.pairs import sample_pairs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.lcd.training import LabelledPairs, Progress, fit_decision, retrieved_pairs
 from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features
 
@@ -80,7 +83,7 @@ def training_pairs(sequence: TrainingSequence, labels: LabelConfig, count: int,
 
 
 def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: LcdConfig,
-                   labels: LabelConfig, pairs: int, seed: int,
+                   labels: LabelConfig, pairs: int, seed: int, network: Path,
                    progress: Progress | None = None) -> Decision:
     """
     Return a decision for a target, with its card.
@@ -97,6 +100,8 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
     pairs : int
         Most loops and random other pairs of a sequence.
     seed : int
+    network : Path
+        Where the network of a target that has one is written (gnn, which takes PyTorch).
     progress : callable, optional
         Called with pairs done and to do.
 
@@ -110,6 +115,9 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
                        'others': int((~chosen.is_loop).sum())}
                       for sequence, chosen in zip(sequences, drawn, strict=True)],
         'map_window': lcd.map_window, 'labels': asdict(labels), 'seed': seed}
+    if target == GnnTarget.name:
+        card['network'] = train_gnn(drawn, network, seed, progress)
+        return fit_decision(target, drawn, lcd.map_window, progress, card, network)
     return fit_decision(target, drawn, lcd.map_window, progress, card)
 
 

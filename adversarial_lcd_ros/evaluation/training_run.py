@@ -25,6 +25,7 @@ from adversarial_lcd_ros.evaluation.model_folder import (
     decision_file,
     file_digests,
     model_folder,
+    network_file,
 )
 from adversarial_lcd_ros.evaluation.results import environment
 from adversarial_lcd_ros.evaluation.training import (
@@ -38,6 +39,7 @@ from adversarial_lcd_ros.evaluation.training_sources import (
     open_source,
 )
 from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.lcd.training import Progress
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 from adversarial_lcd_ros.vision.features import FeatureExtractor, to_grey
@@ -47,6 +49,8 @@ FORMAT = 'adversarial_lcd_ros/model_card/1'
 # Wider than what an evaluation counts as a loop: the decision also learns from glancing ones,
 # and from revisits within a few seconds, which short sequences are full of.
 TRAINING_LABELS = LabelConfig(min_gap_s=3.0, positive_overlap=0.45)
+# Trained unless others are asked for: those that need nothing but this package.
+DEFAULT_TARGETS = tuple(name for name in TARGETS if name != GnnTarget.name)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
 
@@ -88,7 +92,7 @@ class TrainingPlan:
     builder: BuilderConfig = field(default_factory=BuilderConfig)
     lcd: LcdConfig = field(default_factory=LcdConfig)
     labels: LabelConfig = TRAINING_LABELS
-    targets: tuple[str, ...] = TARGETS
+    targets: tuple[str, ...] = DEFAULT_TARGETS
     pairs: int = 600
     vocabulary_stride: int = 2
     branching: int = 16
@@ -224,7 +228,8 @@ def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, 
     for target in plan.targets:
         with stage(f'decision of {target}') as progress:
             decision = train_decision(target, sequences, lcd=plan.lcd, labels=plan.labels,
-                                      pairs=plan.pairs, seed=seed, progress=progress)
+                                      pairs=plan.pairs, seed=seed, progress=progress,
+                                      network=work / network_file(target))
         decision.save(work / decision_file(target))
         card[target] = _decision_card(decision)
     return card

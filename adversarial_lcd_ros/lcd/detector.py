@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
+from adversarial_lcd_ros.lcd.geometry import count_inliers
 from adversarial_lcd_ros.lcd.targets import Scores, make_target, prepare
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
@@ -42,6 +43,8 @@ class QueryNodes:
     comparison : Comparison
     scores : callable
         Scores of a View with every reference.
+    inliers : dict
+        Keyframe to its matches that passed the geometric check, where that was asked for.
 
     """
 
@@ -52,6 +55,7 @@ class QueryNodes:
     average: NDArray[np.float64]
     comparison: Comparison
     scores: Scores
+    inliers: dict[int, int] = field(default_factory=dict)
 
 
 class LoopClosureDetector:
@@ -66,9 +70,9 @@ class LoopClosureDetector:
 
     def __init__(self, config: LcdConfig | None = None) -> None:
         self.config = config or LcdConfig()
-        self._target = make_target(self.config.target)
-        path = (Path(self.config.model) if self.config.model
-                else model_path(f'target_{self.config.target}.json'))
+        chosen = Path(self.config.model) if self.config.model else None
+        self._target = make_target(self.config.target, chosen and chosen.with_suffix('.onnx'))
+        path = chosen or model_path(f'target_{self.config.target}.json')
         self.decision = Decision.load(path, self._target.name, self._target.channels)
         self._database = Database()
         self._view = lru_cache(CACHED_VIEWS)(lambda index: View(self._database[index]))
@@ -108,11 +112,22 @@ class LoopClosureDetector:
         keyframe = nodes.candidates[best]
         chance = probability(float(logit[best]))
         match = self._database[keyframe]
+        if self.config.geometric_check and chance >= self.config.threshold:
+            chance = self._checked(graph, keyframe, chance)
         return LoopClosure(
             graph.stamp_ns, graph.frame_id, graph.sequence,
             is_loop=chance >= self.config.threshold, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
             vbow_score=nodes.bow[best], candidates=len(nodes.candidates))
+
+    def _checked(self, graph: MultiTierGraph, keyframe: int, chance: float) -> float:
+        """Return a probability below the threshold where too few matches agree on a motion."""
+        inliers = self.query_nodes(graph).inliers
+        if keyframe not in inliers:
+            inliers[keyframe] = count_inliers(graph, self._database[keyframe],
+                                              self.config.geometric_threshold_px)
+        share = inliers[keyframe] / self.config.geometric_inliers
+        return chance if share >= 1 else self.config.threshold * share
 
     def log_odds(self, graph: MultiTierGraph) -> NDArray[np.float64]:
         """Return the log odds of a loop with each candidate, the most alike by words first."""

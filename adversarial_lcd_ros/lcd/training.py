@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,13 +108,14 @@ def retrieved_pairs(graphs: Sequence[MultiTierGraph], relation: NDArray[np.int8]
 
 
 def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_window: int,
-                 progress: Progress | None = None, card: dict[str, object] | None = None
-                 ) -> Decision:
+                 progress: Progress | None = None, card: dict[str, object] | None = None,
+                 network: Path | None = None) -> Decision:
     """
     Return a logistic decision on the square roots of the target's scores.
 
     Loops and others weigh the same, whatever their numbers, and so do sequences. The card gets
-    the balanced accuracy on the training pairs of each sequence.
+    the balanced accuracy on the training pairs of each sequence. A target with a network takes
+    the given one.
 
     Raises
     ------
@@ -121,7 +123,7 @@ def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_windo
         There are no loops, or nothing but loops.
 
     """
-    target = make_target(target_name)
+    target = make_target(target_name, network)
     rows, labels, weights = [], [], []
     for pairs in sequences:
         rows.append(PairScorer(target, pairs.graphs, map_window).pairs(pairs, progress))

@@ -1,0 +1,40 @@
+"""The geometric check of a match: whether the features of both frames agree on one motion."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.hamming import lanes, mutual
+
+MAX_HAMMING = 64
+# A fundamental matrix takes seven matches; eight is the first number that can disagree.
+LEAST_MATCHES = 8
+CONFIDENCE, ROUNDS = 0.999, 1000
+
+
+def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> int:
+    """
+    Return how many matched features of two frames fit one fundamental matrix.
+
+    Edges are not looked at. Matches are mutual nearest neighbours within 64 of 256 bits; the
+    matrix is found by USAC, whose draws are fixed: the same graphs give the same number.
+
+    Parameters
+    ----------
+    one, other : MultiTierGraph
+    threshold_px : float
+        Largest distance from the epipolar line, pixels.
+
+    """
+    first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
+                              lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
+    if len(first) < LEAST_MATCHES:
+        return 0
+    points = [graph.position[graph.object_count + rows].astype(np.float64)
+              for graph, rows in ((one, first), (other, second))]
+    matrix, inlier = cv2.findFundamentalMat(*points, cv2.USAC_DEFAULT, threshold_px, CONFIDENCE,
+                                            ROUNDS)
+    # None where the matches do not determine a matrix, as where all lie on one line.
+    return 0 if matrix is None else int(np.count_nonzero(inlier))
