@@ -146,3 +146,15 @@ def test_node_by_node_features_attack_too_but_not_without_queries(tmp_path):
         Attacker(without)
     assert Attacker(replace(without, wl_features='pooled')).process(
         GRAPH, Judge(True, start=8.5)).queries == 0
+
+
+def test_the_svm_ranks_by_the_distance_that_scikit_learn_gives():
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(80, 6))
+    surrogate = make_surrogate('svm_rbf', Kernel())
+    assert surrogate.fit(rows, rows[:, 0] + rng.normal(size=80))
+    new = np.repeat(rng.normal(size=(20, 6)), 2, axis=0)
+    scaled = surrogate._scaler.transform(new)
+    found = surrogate.predict(new)
+    assert found == pytest.approx(surrogate._model.decision_function(scaled), abs=1e-8)
+    assert (found[::2] == found[1::2]).all()

@@ -10,6 +10,8 @@ from sklearn.svm import SVC
 
 from adversarial_lcd_ros.attack.surrogates.classifier import Classifier
 
+TIE_DECIMALS = 9
+
 
 class SvmRbf(Classifier):
     """The distance from the boundary ranks; C = 1."""
@@ -17,4 +19,15 @@ class SvmRbf(Classifier):
     name: ClassVar[str] = 'svm_rbf'
 
     def _make(self, scaled: NDArray[np.float64]) -> SVC:
-        return SVC(kernel='rbf', gamma=self._kernel.gamma(scaled), class_weight='balanced')
+        self._gamma = self._kernel.gamma(scaled)
+        return SVC(kernel='rbf', gamma=self._gamma, class_weight='balanced')
+
+    def _score(self, scaled: NDArray[np.float64]) -> NDArray[np.float64]:
+        # decision_function of 84 rows takes 3.4 ms, most of the hop; one matrix product 0.25.
+        vectors, weight = self._model.support_vectors_, self._model.dual_coef_[0]
+        square = (vectors ** 2).sum(axis=1) + (scaled ** 2).sum(axis=1)[:, None]
+        kernel = np.exp(self._gamma * (2 * scaled @ vectors.T - square))
+        # A product may round equal rows differently, and equal flips go by their order.
+        distance: NDArray[np.float64] = np.round(kernel @ weight + self._model.intercept_[0],
+                                                 TIE_DECIMALS)
+        return distance
