@@ -298,11 +298,11 @@ def test_exact_labels_of_one_differing_word_count_for_nothing():
     query = make_graph(3, [(0, 1), (1, 2)], objects=1, label=np.array([5, 7, 9], np.uint32))
     other = replace(query, label=np.array([5, 7, 8], np.uint32))
     # At iteration 0 two labels of three recur; at 1 only the object's, whose neighbour recurs.
-    assert scores('wl_exact', query, query)['labels'] == pytest.approx(1)
-    assert scores('wl_exact', query, other)['labels'] == pytest.approx(3 / 6)
+    assert scores('wl_exact', query, query)['kernel'] == pytest.approx(1)
+    assert scores('wl_exact', query, other)['kernel'] == pytest.approx(3 / 6)
     # An object of class 7 is not a feature of word 7.
     swapped = make_graph(3, [(0, 1), (1, 2)], objects=1, label=np.array([7, 5, 9], np.uint32))
-    assert scores('wl_exact', query, swapped)['labels'] == pytest.approx(1 / 6)
+    assert scores('wl_exact', query, swapped)['kernel'] == pytest.approx(1 / 6)
 
 
 def test_the_network_sees_edges_and_a_damaged_one_is_refused(tmp_path):
@@ -314,3 +314,10 @@ def test_the_network_sees_edges_and_a_damaged_one_is_refused(tmp_path):
         make_target('gnn', tmp_path / 'gnn.onnx')
     with pytest.raises(ModelError, match='is no network'):
         make_target('gnn', tmp_path / 'missing.onnx')
+
+
+@pytest.mark.parametrize('target', TARGETS)
+def test_what_ships_belongs_to_its_target(target):
+    detector = LoopClosureDetector(LcdConfig(target=target, min_gap_s=1.0))
+    detector.detect(at(0))
+    assert 0 < detector.judge(at(9)).probability < 1

@@ -29,7 +29,7 @@ class WlExactTarget:
     """
 
     name: ClassVar[str] = 'wl_exact'
-    channels: ClassVar[tuple[str, ...]] = ('labels',)
+    channels: ClassVar[tuple[str, ...]] = ('kernel',)
 
     def __init__(self) -> None:
         # A keyframe is compared with many queries.
