@@ -59,6 +59,12 @@ def test_the_command_line_wins(tmp_path):
     assert [(cell.attack.ratio, cell.nodes, cell.target) for cell in cells] == [(3e-4, 50, 'wl')]
 
 
+def test_of_attacks_made_equal_by_the_command_line_the_first_counts():
+    cells = load_cells('paper', {'nodes': 100, 'target': 'wl'})
+    usual, = (cell for cell in cells if cell.attack.surrogate == 'naive_bayes')
+    assert {cell.frames for cell in cells if cell.asked_target == 'wl'} == {usual.frames}
+
+
 @pytest.mark.parametrize(('text', 'said'), [
     ('protocol: frames\nattacks: [{epsilon: 1}]', 'unknown epsilon'),
     ('protocol: frames\nattacks: [{seed: 1}]', 'unknown seed'),

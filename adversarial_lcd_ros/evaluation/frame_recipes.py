@@ -59,7 +59,8 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
     name : str
         A recipe that ships, or the path of a YAML file like config/recipes/paper.yaml.
     overrides : mapping
-        Settings that win over those of every attack in the recipe.
+        Settings that win over those of every attack in the recipe. Of attacks that become equal
+        by them the first counts.
 
     Raises
     ------
@@ -81,7 +82,7 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
                                          **_mapping(path, 'an attack', entry), **overrides}):
             cell = _cell(path, values)
             known = cells.setdefault(repr(cell.settings), cell)
-            if (known.frames, known.seeds) != (cell.frames, cell.seeds):
+            if not overrides and (known.frames, known.seeds) != (cell.frames, cell.seeds):
                 raise ConfigError(f'recipe {path}: {cell.settings} is there twice, with other '
                                   'numbers of frames or seeds: expected it once')
     return list(cells.values())
