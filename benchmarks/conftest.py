@@ -111,16 +111,20 @@ def pytest_sessionfinish(session):
 
 
 @pytest.fixture(scope='session')
-def tour_graphs():
-    """Return a function: graphs of every 9th frame of the embedded tour, by features a graph."""
-    sequence = open_sequence(str(ROOT / 'bags' / 'flat_tour'))
+def tour():
+    """Return the sequence of the embedded tour."""
+    return open_sequence(str(ROOT / 'bags' / 'flat_tour'))
 
+
+@pytest.fixture(scope='session')
+def tour_graphs(tour):
+    """Return a function: graphs of every 9th frame of the embedded tour, by features a graph."""
     @cache
     def build(features):
         builder = GraphBuilder(BuilderConfig(features=features))
         try:
-            return [builder.build(frame.image(), frame.stamp_ns, sequence.name, number)
-                    for number, frame in enumerate(sequence.frames(stride=9))]
+            return [builder.build(frame.image(), frame.stamp_ns, tour.name, number)
+                    for number, frame in enumerate(tour.frames(stride=9))]
         finally:
             builder.close()
     return build

@@ -1,0 +1,231 @@
+"""The hop through the man in the middle, and the whole pipeline in lockstep, between processes."""
+
+from contextlib import contextmanager
+from dataclasses import replace
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='rclpy is not installed')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import UInt8MultiArray
+
+from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.codec import LcdQuery
+from adversarial_lcd_ros.evaluation.graph_bags import _graph_messages
+from adversarial_lcd_ros.evaluation.pipeline import environment
+from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
+from adversarial_lcd_ros.nodes.endpoints import payload_qos
+from adversarial_lcd_ros.nodes.lcd import LcdNode
+from adversarial_lcd_ros.nodes.runtime import make_executor
+from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.sequences.bagfile import BagWriter
+
+PERIOD_S = 1 / 30
+GRAPHS, WARM_UP = 150, 20
+DEADLINE_S = 0.033
+TIMEOUT_S = 30.0
+ATTACKER, RELAY, LCD, REPLAY = (
+    'adversarial_lcd_ros.nodes.attacker', 'relay', 'adversarial_lcd_ros.nodes.lcd',
+    'adversarial_lcd_ros.nodes.bag_replay')
+SURROGATE = {'mode': 'surrogate'}
+QUERY = {'mode': 'query', 'deadline_ms': DEADLINE_S * 1e3}
+
+
+@pytest.fixture(autouse=True)
+def loopback(monkeypatch):
+    """Put this process and those that it starts into one domain, on this machine only."""
+    for name, value in environment().items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
+        (str(Path(__file__).parents[1]), str(Path(__file__).parent))))
+
+
+@contextmanager
+def process(module, **parameters):
+    """Run a node as a process of its own."""
+    command = [sys.executable, '-m', module, '--ros-args']
+    for name, value in parameters.items():
+        command += ['-p', f'{name}:={value}']
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        yield running
+    finally:
+        if running.poll() is None:
+            running.send_signal(signal.SIGINT)
+        running.communicate()
+
+
+class Probe:
+    """Publishes graphs as a builder would, and hears what the detector would."""
+
+    def __init__(self):
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node('probe', context=self._context)
+        self._executor = make_executor(self._context)
+        self._executor.add_node(self._node)
+        self.arrived = []
+        self.reports = []
+        self.answers = []
+        self.clean = self._publisher('graph_clean')
+        self.queries = self._publisher('query')
+        self._hear('graph', lambda _: self.arrived.append(time.perf_counter()))
+        self._hear('attack_report', lambda wire: self.reports.append(
+            codec.decode_attack_report(unwrap(wire))))
+        self._hear('answer', lambda _: self.answers.append(time.perf_counter()))
+
+    def _publisher(self, topic):
+        return self._node.create_publisher(UInt8MultiArray, topic, payload_qos())
+
+    def _hear(self, topic, callback):
+        self._node.create_subscription(UInt8MultiArray, topic, callback, payload_qos(), raw=True)
+
+    def until(self, condition):
+        deadline_s = time.monotonic() + TIMEOUT_S
+        while not condition():
+            assert time.monotonic() < deadline_s, 'the nodes did not answer'
+            self._executor.spin_once(timeout_sec=0.01)
+
+    def round_trips(self, publisher, heard, wires):
+        """Publish at 30 Hz, and return the seconds from each to what comes back, shape (k,)."""
+        taken = []
+        for wire in wires:
+            began_s, before = time.perf_counter(), len(heard)
+            publisher.publish(wire)
+            self.until(lambda: len(heard) > before)  # noqa: B023
+            taken.append(heard[-1] - began_s)
+            while time.perf_counter() < began_s + PERIOD_S:
+                self._executor.spin_once(timeout_sec=0.001)
+        return np.array(taken)
+
+    def close(self):
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.shutdown()
+
+
+@pytest.fixture
+def probe(loopback):
+    found = Probe()
+    yield found
+    found.close()
+
+
+def stream(graphs):
+    """Return the graphs of the tour over and over, as they would be published."""
+    return [replace(graphs[number % len(graphs)], stamp_ns=round((number + 1) * PERIOD_S * 1e9),
+                    sequence=number) for number in range(WARM_UP + GRAPHS)]
+
+
+def through(probe, module, wires, **parameters):
+    """Return the round trips through a node, without the first ones."""
+    with process(module, **parameters):
+        probe.until(lambda: probe.clean.get_subscription_count())
+        taken = probe.round_trips(probe.clean, probe.arrived, wires)[WARM_UP:]
+        probe.until(lambda: module == RELAY or len(probe.reports) == len(wires))
+    probe.until(lambda: not probe.clean.get_subscription_count())
+    return taken
+
+
+@pytest.mark.parametrize('features', [300, 1000])
+def test_surrogate_only(measured, probe, tour_graphs, features):
+    graphs = stream(tour_graphs(features))
+    wires = [wrap(codec.encode_graph(graph)) for graph in graphs]
+    size = f'n = {graphs[0].node_count}, surrogate only'
+    relayed = through(probe, RELAY, wires)
+    attacked = through(probe, ATTACKER, wires, **SURROGATE)
+    assert all(report.edits for report in probe.reports)
+    inside = [report.duration_s for report in probe.reports[WARM_UP:]]
+    for share, mark in ((50, 5e-3), (99, PERIOD_S)):
+        measured('hop', f'{size}, arrival to publication, p{share}',
+                 np.percentile(inside, share), mark=mark if features == 300 else None)
+        measured('hop', f'{size}, there and back, p{share}', np.percentile(attacked, share),
+                 'bare relay of the bytes', np.percentile(relayed, share))
+
+
+def test_query_guided_keeps_its_deadline(measured, probe, tour_graphs):
+    graphs = stream(tour_graphs(300))
+    wires = [wrap(codec.encode_graph(graph)) for graph in graphs]
+    with process(LCD, min_gap_s=0.5):
+        probe.until(lambda: probe.queries.get_subscription_count())
+        through(probe, ATTACKER, wires, **QUERY)
+        # The first query about a frame is the longest: the detector has not met its nodes.
+        asked = probe.round_trips(probe.queries, probe.answers, [
+            wrap(codec.encode_query(LcdQuery(number, graph)))
+            for number, graph in enumerate(graphs[-50:])])
+    reports = probe.reports[WARM_UP:]
+    assert any(report.reason == 'deadline' for report in reports)
+    measured('hop', f'n = {graphs[0].node_count}, query-guided, deadline {DEADLINE_S * 1e3:g} ms, '
+             'longest beside deadline and longest query',
+             max(report.duration_s for report in reports), mark=DEADLINE_S + asked.max())
+
+
+@pytest.fixture(scope='module')
+def graph_bag(tour, tmp_path_factory):
+    """Return a bag with the graphs of all frames of the tour, 300 features each."""
+    from adversarial_lcd_ros.config import BuilderConfig
+    from adversarial_lcd_ros.vision.builder import GraphBuilder
+    path = tmp_path_factory.mktemp('lockstep') / 'graphs'
+    with GraphBuilder(BuilderConfig(detector='none')) as builder, BagWriter(path) as bag:
+        graphs = [builder.build(frame.image(), frame.stamp_ns, tour.name, number)
+                  for number, frame in enumerate(tour.frames())]
+        for row in _graph_messages(graphs, '/graph'):
+            bag.write(*row)
+    return path
+
+
+def seconds_a_frame(said, frames):
+    """Read what bag_replay said of a replay in which nothing was lost."""
+    found = re.search(r'(\d+) frames, (\d+) decisions, [\d.]+ s, ([\d.]+) frames/s', said)
+    assert found, said
+    assert int(found[1]) == int(found[2]) == frames
+    return 1 / float(found[3])
+
+
+@pytest.mark.parametrize(('target', 'mark'), [('vbow', 1 / 300), ('wl', None)])
+def test_lockstep_in_one_process(measured, graph_bag, tour, capfd, target, mark):
+    from rclpy.parameter import Parameter
+    context = Context()
+    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    executor = make_executor(context)
+    nodes = [node_class(context=context, use_global_arguments=False, parameter_overrides=[
+        Parameter(name, value=value) for name, value in parameters.items()])
+        for node_class, parameters in (
+            (LcdNode, {'target': target}),
+            (BagReplayNode, {'bag': str(graph_bag), 'lockstep': True}))]
+    for node in nodes:
+        executor.add_node(node)
+
+    def spin(seconds):
+        executor.spin_once(timeout_sec=seconds)
+        return True
+
+    assert nodes[1].work(spin) == 0
+    for node in reversed(nodes):
+        node.close()
+        executor.remove_node(node)
+        node.destroy_node()
+    executor.shutdown()
+    context.shutdown()
+    measured('lockstep', f'one process, target {target}, a graph',
+             seconds_a_frame(capfd.readouterr().out, tour.frame_count), mark=mark)
+
+
+@pytest.mark.parametrize(('target', 'mark'), [('vbow', 1 / 200), ('wl', None)])
+def test_lockstep_across_processes(measured, graph_bag, tour, target, mark):
+    with (process(LCD, target=target),
+          process(REPLAY, bag=graph_bag, lockstep='true', window=4) as replay):
+        said, _ = replay.communicate(timeout=60)
+    measured('lockstep', f'two processes, target {target}, a graph',
+             seconds_a_frame(said, tour.frame_count), mark=mark)
