@@ -61,13 +61,6 @@ def test_edge_score_counts_edges_between_matched_features():
     assert scores('edges', fewer, GRAPH)['edges'] == pytest.approx(36 * 0.6 / 55.5, abs=1e-6)
 
 
-def test_anchored_counts_spokes_and_not_edges_between_features():
-    clean = scores('anchored', GRAPH, GRAPH)
-    assert clean['spokes'] == pytest.approx(18 * np.sqrt(0.6) / 38, abs=1e-6)
-    assert scores('anchored', GRAPH.flip([(30, 31)]), GRAPH) == pytest.approx(clean)
-    assert scores('anchored', GRAPH.flip([(0, 5)]), GRAPH)['spokes'] < clean['spokes']
-
-
 def test_objects_counts_what_recurs_in_class_size_and_arrangement():
     classes, square = [3, 5, 5], np.array([[100, 100], [300, 100], [300, 400]], np.float32)
     fields = {'label': np.array(classes, np.uint32), 'position': square,
