@@ -31,7 +31,7 @@ from adversarial_lcd_ros.evaluation.pairs import sample_pairs
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
 from adversarial_lcd_ros.lcd.decision import Decision
-from adversarial_lcd_ros.lcd.targets import make_target
+from adversarial_lcd_ros.lcd.targets import Target, make_target
 from adversarial_lcd_ros.lcd.training import LabelledPairs, PairScorer
 from adversarial_lcd_ros.paths import model_path
 
@@ -87,8 +87,12 @@ class TargetTask:
 
     def decision(self) -> Decision:
         """Return the trained decision of the target."""
-        target = make_target(self.target)
+        target = self.make_target()
         return Decision.load(self._model, target.name, target.channels)
+
+    def make_target(self) -> Target:
+        """Return the target; one with a network takes that beside its decision."""
+        return make_target(self.target, self._model.with_suffix('.onnx'))
 
     def labels(self) -> FrameLabels:
         """Return the labels, without queries outside the part that is scored."""
@@ -138,7 +142,7 @@ def _pairs(task: TargetTask) -> Row:
                               for value in (POSITIVE, NEGATIVE)))
     if not count:
         return {**_figures(None), 'n_pairs': 0, 'seeds': 0, 'ci95': None}
-    scorer = PairScorer(make_target(task.target), graphs, task.lcd.map_window)
+    scorer = PairScorer(task.make_target(), graphs, task.lcd.map_window)
     query, is_loop, logit = [], [], []
     for seed in task.seeds:
         drawn = sample_pairs(labels.relation, np.random.default_rng(seed), count)
