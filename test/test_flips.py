@@ -1,6 +1,7 @@
 """Log odds after single flips, against making each flip and asking the detector."""
 
 from dataclasses import replace
+import shutil
 
 from graph_factory import flips_of, graphs, make_graph
 from hypothesis import given, settings
@@ -13,14 +14,18 @@ from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer, flip_logits
 from adversarial_lcd_ros.lcd.targets import TARGETS
+from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
+from adversarial_lcd_ros.paths import model_path
 
 
-@pytest.fixture(params=['wl', 'edges', 'anchored', 'vbow'])
+@pytest.fixture(params=list(TARGETS))
 def make_detector(request, tmp_path):
     """Return a function that makes a detector with given keyframes, one a second."""
     channels = TARGETS[request.param].channels
     path = tmp_path / 'model.json'
     Decision(request.param, channels, (7.0, 9.0, 5.0)[:len(channels)], -8.0).save(path)
+    if request.param == 'gnn':
+        shutil.copy(model_path(NETWORK), path.with_suffix('.onnx'))
 
     def make(keyframes):
         detector = LoopClosureDetector(

@@ -196,12 +196,14 @@ def _total(cosine: NDArray[np.float64]) -> tuple[float, float]:
 
 
 # Scores of a target, in the order of its channels. Of targets without an entry, flips are made
-# and judged one by one, where an end is an object: only "wl" and "edges" look at other edges.
+# and judged one by one.
 CHANNELS: dict[str, tuple[Callable[[QueryNodes], _Channel], ...]] = {
     'wl': (_Edges, _Neighbourhoods, _Objects),
     'edges': (_Edges,),
 }
 IMMUNE = ('descriptors', 'vbow')
+# Those that feel a flip only where an end is an object.
+AT_OBJECTS = ('anchored', 'objects')
 
 
 class FlipScorer:
@@ -280,7 +282,8 @@ class FlipScorer:
         graph, objects = flips.view.graph, flips.view.objects
         logits = np.full(len(flips.pairs), self.detector.log_odds(graph).max())
         if self._target not in IMMUNE:
-            for place in np.flatnonzero(flips.pairs[:, 0] < objects):
+            felt = (flips.pairs[:, 0] < objects) | (self._target not in AT_OBJECTS)
+            for place in np.flatnonzero(felt):
                 flipped = graph.flip(flips.pairs[place])
                 logits[place] = self.detector.log_odds(flipped).max()
         return logits
