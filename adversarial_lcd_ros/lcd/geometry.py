@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.hamming import lanes, mutual
@@ -19,7 +22,8 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
     Return how many matched features of two frames fit one fundamental matrix.
 
     Edges are not looked at. Matches are mutual nearest neighbours within 64 of 256 bits; the
-    matrix is found by USAC, whose draws are fixed: the same graphs give the same number.
+    matrix is found by USAC or, where OpenCV's cannot go on, by its plain RANSAC. The draws of
+    both are fixed: the same graphs give the same number.
 
     Parameters
     ----------
@@ -34,7 +38,17 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
         return 0
     points = [graph.position[graph.object_count + rows].astype(np.float64)
               for graph, rows in ((one, first), (other, second))]
-    matrix, inlier = cv2.findFundamentalMat(*points, cv2.USAC_DEFAULT, threshold_px, CONFIDENCE,
-                                            ROUNDS)
-    # None where the matches do not determine a matrix, as where all lie on one line.
+    try:
+        matrix, inlier = _fundamental(points, cv2.USAC_DEFAULT, threshold_px)
+    except cv2.error:
+        # On some planar scenes USAC refines an empty matrix and raises; RANSAC does not refine.
+        matrix, inlier = _fundamental(points, cv2.FM_RANSAC, threshold_px)
+    # None where the matches determine no matrix, as unrelated ones on one line.
     return 0 if matrix is None else int(np.count_nonzero(inlier))
+
+
+def _fundamental(points: Sequence[NDArray[np.float64]], method: int, threshold_px: float
+                 ) -> tuple[NDArray[np.float64] | None, NDArray[np.uint8]]:
+    found: tuple[NDArray[np.float64] | None, NDArray[np.uint8]] = cv2.findFundamentalMat(
+        *points, method, threshold_px, CONFIDENCE, ROUNDS)
+    return found
