@@ -144,7 +144,8 @@ class LcdConfig(Config):
     geometric_check: bool = setting(
         False, 'Declare a loop only if the features of both frames agree on one camera motion.')
     geometric_inliers: int = setting(
-        20, 'Geometric check: least matches that agree.', low=8, high=100_000)
+        20, 'Geometric check: least matches that agree; the default is for graphs of about 300 '
+        'features.', low=8, high=100_000)
     geometric_threshold_px: float = setting(
         3.0, 'Geometric check: largest distance of a match from its epipolar line, pixels.',
         low=0.01, high=1000.0)

@@ -75,7 +75,9 @@ class TargetTask:
         """Digest of all that the figures depend on, hexadecimal."""
         values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
-                  'model': file_digest(self._model), 'seeds': self.seeds,
+                  'models': [file_digest(path) for path in
+                             (self._model, self._model.with_suffix('.onnx')) if path.exists()],
+                  'seeds': self.seeds,
                   'scored': self.scored}
         if self.protocol == 'pairs':
             values['pairs'] = self.pairs

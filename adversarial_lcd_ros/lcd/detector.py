@@ -112,22 +112,24 @@ class LoopClosureDetector:
         keyframe = nodes.candidates[best]
         chance = probability(float(logit[best]))
         match = self._database[keyframe]
-        if self.config.geometric_check and chance >= self.config.threshold:
-            chance = self._checked(graph, keyframe, chance)
+        is_loop = chance >= self.config.threshold
+        if is_loop and self.config.geometric_check:
+            share = self._inliers(graph, keyframe) / self.config.geometric_inliers
+            if share < 1:
+                is_loop, chance = False, self.config.threshold * share
         return LoopClosure(
             graph.stamp_ns, graph.frame_id, graph.sequence,
-            is_loop=chance >= self.config.threshold, probability=chance,
+            is_loop=is_loop, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
             vbow_score=nodes.bow[best], candidates=len(nodes.candidates))
 
-    def _checked(self, graph: MultiTierGraph, keyframe: int, chance: float) -> float:
-        """Return a probability below the threshold where too few matches agree on a motion."""
+    def _inliers(self, graph: MultiTierGraph, keyframe: int) -> int:
+        """Return how many matches with a keyframe agree on one motion; flips do not change it."""
         inliers = self.query_nodes(graph).inliers
         if keyframe not in inliers:
             inliers[keyframe] = count_inliers(graph, self._database[keyframe],
                                               self.config.geometric_threshold_px)
-        share = inliers[keyframe] / self.config.geometric_inliers
-        return chance if share >= 1 else self.config.threshold * share
+        return inliers[keyframe]
 
     def log_odds(self, graph: MultiTierGraph) -> NDArray[np.float64]:
         """Return the log odds of a loop with each candidate, the most alike by words first."""
