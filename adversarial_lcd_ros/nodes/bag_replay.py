@@ -30,8 +30,9 @@ RECORDED = (*GRAPHS, DECISIONS, REPORTS)
 _DEPTH = 10
 _CLOCK_PERIOD_S = 0.025
 _SPIN_S = 0.1
-# The other ends have matched as seen from here; this is for them to see it too.
-_SETTLE_S = 0.25
+# The other ends have matched as seen from here; this is for them to see it too, and each other.
+# A quarter of a second was too short once on a busy machine: the first graph was lost.
+_SETTLE_S = 1.0
 
 
 class Stopped(Exception):  # noqa: N818
