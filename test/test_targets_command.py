@@ -12,6 +12,7 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation import workers
 from adversarial_lcd_ros.evaluation.target_recipes import Choices, recipe_sequences
 from adversarial_lcd_ros.evaluation.target_run import trained_on
+from adversarial_lcd_ros.evaluation.target_tables import target_tables
 
 NOTHING = Choices({}, {}, {})
 
@@ -44,6 +45,8 @@ def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
     pairs, live = rows[0], rows[2]
     assert (pairs['n_pairs'], pairs['positives'], pairs['seeds']) == (20, 10, 2)
     assert (live['n_frames'], live['positives'], live['negatives']) == (12, 6, 2)
+    assert pairs['distinct_pairs'] <= pairs['n_pairs']
+    assert (pairs['labels']['rule'], pairs['labels']['min_gap_s']) == ('distance', 0.1)
     # Each place is seen twice in nearly the same picture: matching cannot miss that.
     assert pairs['average_precision'] == pytest.approx(1)
     low, high = pairs['ci95']
@@ -57,6 +60,25 @@ def test_rows_that_are_there_are_not_made_again(tmp_path, command, capsys):
     assert command('--targets', 'vbow', '--protocols', 'live') == 0
     assert '0 of 1 rows to make' in capsys.readouterr().err
     assert (tmp_path / 'out' / 'cells.jsonl').read_bytes() == before
+
+
+@pytest.mark.parametrize('protocol', ['pairs', 'live'])
+def test_rows_of_other_labels_are_not_taken_for_these(command, capsys, protocol):
+    # Less in common to be another place: no frame of a replay is labelled otherwise, pairs are.
+    for overlap in ('0.1', '0.05'):
+        assert command('--targets', 'vbow', '--protocols', protocol, '--label-rule', 'overlap',
+                       '--label-negative-overlap', overlap) == 0
+        assert '1 of 1 rows to make' in capsys.readouterr().err
+
+
+def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
+    # More matches are asked for than there are features: nothing passes.
+    assert command('--targets', 'edges', '--lcd-geometric-check',
+                   '--lcd-geometric-inliers', '21') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert [row['geometric_check'] for row in rows] == [False, True]
+    assert rows[1]['recall'] == 0
+    assert '| walk, geometric check |' in capsys.readouterr().out
 
 
 def test_live_and_pairs_see_the_threshold(tmp_path, command):
@@ -100,3 +122,17 @@ def test_the_recipe_that_ships_is_one(tmp_path):
     ('rgbd_dataset_freiburg1_rpy@0.5:1', False), ('rgbd_dataset_freiburg1_rpy@0.4:1', True)])
 def test_the_card_tells_what_was_trained_on(source, seen):
     assert np.bool_(trained_on(source)) == seen
+
+
+def test_a_map_may_be_trained_on_where_the_queries_are_not():
+    source = 'rgbd_dataset_freiburg1_rpy'
+    assert not trained_on(source, (0.5, 1))
+    assert trained_on(source, (0, 1))
+    row = {'sequence': source, 'target': 'wl', 'protocol': 'pairs', 'nodes': 300,
+           'nodes_mean': 305.0, 'scored': [0.5, 1], 'trained_on': False,
+           'references_trained_on': True, 'geometric_check': False, 'n_pairs': 0,
+           'ci95': None, **dict.fromkeys(('positives', 'balanced_accuracy', 'average_precision',
+                                          'recall_at_100_precision', 'mcc'))}
+    line = target_tables([row]).splitlines()[2]
+    assert line.startswith(f'| {source}, scored from 0.5 to 1 (references seen in training) |')
+    assert '| 0 (0 loops) | - | - | - | - | - |' in line

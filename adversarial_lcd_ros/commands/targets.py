@@ -118,7 +118,7 @@ def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTa
 
     seeds = tuple(range(options.seed, options.seed + options.draws))
     return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds,
-                       sequence.scored)
+                       sequence.scored, sequence.labels)
             for sequence in sequences for stream in _streams(sequence, options.cache)
             for protocol in options.protocols for target in sequence.targets]
 

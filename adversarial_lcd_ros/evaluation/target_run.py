@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import statistics
 from adversarial_lcd_ros.evaluation.cells import digest_of, file_digest
 from adversarial_lcd_ros.evaluation.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
@@ -35,7 +35,7 @@ from adversarial_lcd_ros.lcd.targets import Target, make_target
 from adversarial_lcd_ros.lcd.training import LabelledPairs, PairScorer
 from adversarial_lcd_ros.paths import model_path
 
-SCHEMA = 1
+SCHEMA = 2
 PROTOCOLS = ('pairs', 'live')
 Row = dict[str, Any]
 
@@ -59,6 +59,8 @@ class TargetTask:
         One draw of pairs each.
     scored : (float, float)
         From and to which fraction of the frames queries are scored; the others are map only.
+    label_config : LabelConfig
+        What the stream was labelled with.
 
     """
 
@@ -69,6 +71,7 @@ class TargetTask:
     pairs: int
     seeds: tuple[int, ...]
     scored: tuple[float, float] = (0.0, 1.0)
+    label_config: LabelConfig = LabelConfig()
 
     @property
     def key(self) -> str:
@@ -78,9 +81,11 @@ class TargetTask:
                   'models': [file_digest(path) for path in
                              (self._model, self._model.with_suffix('.onnx')) if path.exists()],
                   'seeds': self.seeds,
-                  'scored': self.scored}
+                  'scored': self.scored, 'labels': asdict(self.label_config)}
         if self.protocol == 'pairs':
-            values['pairs'] = self.pairs
+            # The stream's digest is of what a replay needs, and knows nothing of pairs.
+            values |= {'pairs': self.pairs,
+                       'relation': digest_of(self.labels().relation.tobytes())}
         return digest_of(json.dumps(values, sort_keys=True).encode())
 
     @property
@@ -112,10 +117,12 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     """
     Return the key of a task and its row.
 
-    The row has ``sequence, target, protocol, nodes, nodes_mean, frames, positives, negatives,
-    trained_on, balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc,
-    precision, recall``, and ``n_pairs, seeds`` or ``n_frames, latency_to_first_closure_s``.
-    Undefined figures are None, so all of a sequence without pairs of a class.
+    The row has ``sequence, target, protocol, nodes, nodes_mean, frames, scored, trained_on,
+    references_trained_on, geometric_check, labels, positives, negatives, balanced_accuracy,
+    ci95, average_precision, recall_at_100_precision, mcc, precision, recall``, and ``n_pairs,
+    distinct_pairs, seeds`` or ``n_frames, wrong_matches, latency_to_first_closure_s``; labels
+    are settings. Pairs are judged without the geometric check. Undefined figures are None, so
+    all of a sequence without pairs of a class.
     """
     figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
     stream = task.stream
@@ -123,7 +130,10 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
         'sequence': stream.name, 'target': task.target, 'protocol': task.protocol,
         'nodes': stream.nodes, 'nodes_mean': stream.nodes_mean,
         'frames': len(stream.labels.kind), 'scored': list(task.scored),
-        'trained_on': trained_on(stream.graphs.source, task.scored), **figures}
+        'trained_on': trained_on(stream.graphs.source, task.scored),
+        'references_trained_on': trained_on(stream.graphs.source, (0.0, task.scored[1])),
+        'geometric_check': task.protocol == 'live' and task.lcd.geometric_check,
+        'labels': asdict(task.label_config), **figures}
 
 
 def trained_on(source: str, scored: tuple[float, float] = (0.0, 1.0)) -> bool:
@@ -143,22 +153,20 @@ def _pairs(task: TargetTask) -> Row:
     count = min(task.pairs, *(int((labels.relation == value).sum())
                               for value in (POSITIVE, NEGATIVE)))
     if not count:
-        return {**_figures(None), 'n_pairs': 0, 'seeds': 0, 'ci95': None}
+        return {**_figures(None), 'n_pairs': 0, 'distinct_pairs': 0, 'seeds': 0, 'ci95': None}
     scorer = PairScorer(task.make_target(), graphs, task.lcd.map_window)
-    query, is_loop, logit = [], [], []
-    for seed in task.seeds:
-        drawn = sample_pairs(labels.relation, np.random.default_rng(seed), count)
-        pairs = LabelledPairs(graphs, drawn.query, drawn.reference, drawn.is_loop)
-        query.append(drawn.query)
-        is_loop.append(drawn.is_loop)
-        logit.append(decision.logit(scorer.pairs(pairs)))
-    kind = np.where(np.concatenate(is_loop), POSITIVE, NEGATIVE).astype(np.int8)
-    probability = 1 / (1 + np.exp(-np.concatenate(logit)))
+    draws = [sample_pairs(labels.relation, np.random.default_rng(seed), count)
+             for seed in task.seeds]
+    query, reference, is_loop = (np.concatenate([getattr(draw, name) for draw in draws])
+                                 for name in ('query', 'reference', 'is_loop'))
+    logit = decision.logit(scorer.pairs(LabelledPairs(graphs, query, reference, is_loop)))
+    kind = np.where(is_loop, POSITIVE, NEGATIVE).astype(np.int8)
+    probability = 1 / (1 + np.exp(-logit))
     declared = probability >= task.lcd.threshold
     metrics = measure(kind, declared, probability, np.ones(len(kind), bool))
     return {**_figures(metrics), 'n_pairs': len(kind), 'seeds': len(task.seeds),
-            'ci95': _pair_interval(labels, np.concatenate(query), kind,
-                                   declared == (kind == POSITIVE))}
+            'distinct_pairs': np.unique([query, reference], axis=1).shape[1],
+            'ci95': _pair_interval(labels, query, kind, declared == is_loop)}
 
 
 def _pair_interval(labels: FrameLabels, query: NDArray[np.int64], kind: NDArray[np.int8],

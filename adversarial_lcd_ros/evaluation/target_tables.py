@@ -41,8 +41,12 @@ def _group_lines(group: Sequence[Row]) -> list[str]:
         name = row['sequence']
         if row['scored'] != [0, 1]:
             name += f', scored from {row["scored"][0]:g} to {row["scored"][1]:g}'
+        if row['geometric_check']:
+            name += ', geometric check'
         if row['trained_on']:
             name += ' (seen in training)'
+        elif row['references_trained_on']:
+            name += ' (references seen in training)'
         first = (name, f'{row["nodes_mean"]:.0f}') if not place else ('', '')
         lines.append(_line((*first, f'`{row["target"]}`', *_cells(row))))
     return lines
@@ -52,7 +56,7 @@ def _cells(row: Row) -> list[str]:
     interval = row['ci95'] and f'{_share(row["ci95"][0])} to {_share(row["ci95"][1])}'
     accuracy = [_share(row['balanced_accuracy']), interval or '-']
     if row['protocol'] == 'pairs':
-        return [f'{row["n_pairs"]} ({row["positives"]} loops)', *accuracy,
+        return [f'{row["n_pairs"]} ({row["positives"] or 0} loops)', *accuracy,
                 *(_share(row[name]) for name in
                   ('average_precision', 'recall_at_100_precision', 'mcc'))]
     latency = row['latency_to_first_closure_s']
