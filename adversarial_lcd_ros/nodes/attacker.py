@@ -19,6 +19,7 @@ from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.errors import CodecError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.nodes.compiled import load_for_attacker
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.oracle import TopicOracle
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
@@ -52,6 +53,7 @@ class AttackerNode(PipelineNode):
         config, self._node_config = self.settings
         self._refuse_loop()
         self._attacker = Attacker(config)
+        load_for_attacker(config)
         self._oracle = TopicOracle(self, self.diagnostics, self._node_config.query_timeout_s)
         self._reports = create_payload_publisher(self, 'attack_report')
         self._output: Publisher | None = None

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 import sys
 import time
 from typing import Any
 
-import numpy as np
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError
-from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.nodes.compiled import load_for_detector
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -24,28 +21,6 @@ from adversarial_lcd_ros.nodes.endpoints import (
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
-
-
-def load_compiled(config: LcdConfig) -> None:
-    """
-    Let a detector of its own judge a loop, so that all compiled code is loaded, or compiled.
-
-    Else the first graph with something to compare with would wait for it, a second or more:
-    an attacker's deadline would pass over one query.
-    """
-    detector = LoopClosureDetector(replace(config, min_gap_s=0.0))
-    nodes = 4
-    ends = np.stack(np.triu_indices(nodes, 1), axis=1).astype(np.uint32)
-    graph = codec.decode_graph(codec.encode_graph(MultiTierGraph(
-        stamp_ns=0, frame_id='', sequence=0, width=1, height=1,
-        tier=np.array([0, 0, 1, 1], np.uint8), label=np.zeros(nodes, np.uint32),
-        position=np.zeros((nodes, 2), np.float32), size=np.ones((nodes, 2), np.float32),
-        score=np.ones(nodes, np.float32), descriptor=np.zeros((nodes, 32), np.uint8),
-        edge=ends, edge_length=np.zeros(len(ends), np.float32),
-        word=np.zeros(1, np.uint32), word_weight=np.ones(1, np.float32))))
-    detector.remember(graph)
-    for pairs in (np.zeros((0, 2), np.int64), ends[:1], ends[-1:]):
-        detector.judge(graph.flip(pairs))
 
 
 class LcdNode(PipelineNode):
@@ -64,7 +39,7 @@ class LcdNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.detector = LoopClosureDetector(self.settings[0])
-        load_compiled(self.settings[0])
+        load_for_detector(self.settings[0])
         self._decisions = create_payload_publisher(self, 'loop_closures')
         self._answers = create_payload_publisher(self, 'answer')
         self._graphs = MirroredSubscription(

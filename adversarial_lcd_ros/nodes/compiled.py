@@ -1,0 +1,60 @@
+"""
+Compiled code, loaded before the first message.
+
+Else the first graph with something to compare with would wait for it, a second or more: an
+attacker's deadline would pass over one query, and a frame at 30 Hz over thirty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.attack.attacker import Attacker
+from adversarial_lcd_ros.codec import LcdAnswer
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+
+_OBJECTS = 2
+# Centralities of fewer nodes come from a dense solver, not from compiled code.
+_NODES = 102
+_LATER_NS = 3_600_000_000_000
+
+
+def load_for_detector(config: LcdConfig) -> None:
+    """Let a detector of its own judge a loop."""
+    detector = LoopClosureDetector(replace(config, min_gap_s=0.0))
+    graph = _graph(0)
+    detector.remember(graph)
+    for pairs in (graph.edge[:0], graph.edge[:1], graph.edge[-1:]):
+        detector.judge(graph.flip(pairs))
+
+
+def load_for_attacker(config: AttackConfig) -> None:
+    """Let an attacker of its own attack a graph that he has seen before, with one edge more."""
+    attacker = Attacker(replace(config, ratio=1.5 / _NODES ** 2, deadline_ms=0.0))
+    later = _graph(_LATER_NS)
+    for graph in (_graph(0), later.flip(later.edge[-1:])):
+        attacker.process(graph, lambda graph: LcdAnswer(
+            id=0, is_loop=False, is_soft=True, probability=0.25))
+
+
+def _graph(stamp_ns: int) -> MultiTierGraph:
+    """Return two objects, and a ring of features of which each sees both, as off the wire."""
+    feature = np.arange(_OBJECTS, _NODES)
+    ring = np.sort(np.stack([feature, np.roll(feature, 1)], axis=1), axis=1)
+    seen = np.stack(np.meshgrid(np.arange(_OBJECTS), feature, indexing='ij'), axis=-1)
+    edge = np.concatenate([[(0, 1)], seen.reshape(-1, 2), ring])
+    edge = edge[np.lexsort((edge[:, 1], edge[:, 0]))].astype(np.uint32)
+    descriptor = np.zeros((_NODES, 32), np.uint8)
+    descriptor[_OBJECTS:] = np.random.default_rng(0).integers(0, 256, (len(feature), 32))
+    return codec.decode_graph(codec.encode_graph(MultiTierGraph(
+        stamp_ns=stamp_ns, frame_id='', sequence=0, width=640, height=480,
+        tier=(np.arange(_NODES) >= _OBJECTS).astype(np.uint8), label=np.zeros(_NODES, np.uint32),
+        position=np.stack([np.arange(_NODES) / _NODES] * 2, axis=1).astype(np.float32),
+        size=np.ones((_NODES, 2), np.float32), score=np.ones(_NODES, np.float32),
+        descriptor=descriptor, edge=edge, edge_length=np.zeros(len(edge), np.float32),
+        word=np.zeros(1, np.uint32), word_weight=np.ones(1, np.float32))))
