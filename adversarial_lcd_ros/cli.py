@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 from collections.abc import Sequence
+import signal
 import sys
 
 from adversarial_lcd_ros import __version__
@@ -31,9 +32,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     Run a subcommand and return the exit code.
 
-    0: done; 2: the command line or an input is wrong, said in one line; 130: interrupted.
+    0: done; 2: the command line or an input is wrong, said in one line; 130: interrupted, by
+    SIGINT or SIGTERM.
     """
     options = _parser().parse_args(argv)
+    # A cluster or a shell that ends us gets the same tidy end as Ctrl-C.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         options.run(options)
     except AdversarialLcdError as error:
@@ -42,6 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('interrupted', file=sys.stderr)
         return EXIT_INTERRUPTED
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return EXIT_OK
 
 

@@ -1,5 +1,7 @@
 """The command: thin, errors in one line, exit codes."""
 
+import signal
+
 from graph_factory import make_graph
 import numpy as np
 import pytest
@@ -90,12 +92,15 @@ def test_known_error_is_one_line_and_exit_code_2(tmp_path, capsys):
     assert captured.out == ''
 
 
-def test_interrupt_ends_with_130(monkeypatch, capsys):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_ends_with_130(monkeypatch, capsys, number):
     def interrupt(destination, progress):
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
     monkeypatch.setattr('adversarial_lcd_ros.provision.fetch_object_model', interrupt)
+    before = signal.getsignal(number)
     assert main(['fetch-model']) == 130
     assert capsys.readouterr().err == 'interrupted\n'
+    assert signal.getsignal(number) == before
 
 
 def test_params_prints_the_parameter_file(capsys):
@@ -111,7 +116,7 @@ def test_inspect_shows_topics_and_graphs_of_a_bag(graph_bag, capsys):
     assert rows[0] == ['/graph', kind, '3', 'MultiTierGraph']
     assert rows[1] == ['/loop_closures', kind, '1', 'LoopClosure']
     assert ' '.join(rows[2]) == '/graph 8.0 (6 to 10) 4.0 (4 to 4) 2.0 (2 to 2)'
-    assert any(line.rstrip().endswith(': 1.0 s') for line in lines)
+    assert lines[0] == f'{graph_bag}: 1.0 s'
 
 
 def test_inspect_refuses_a_topic_of_graphs_that_stops_being_one(tmp_path, capsys):

@@ -2,6 +2,7 @@
 
 from functools import partial
 import json
+import sys
 
 import bag_factory as make
 import cv2
@@ -17,6 +18,7 @@ from adversarial_lcd_ros.errors import (
     ModelError,
     SequenceError,
 )
+from adversarial_lcd_ros.evaluation import training_run
 from adversarial_lcd_ros.evaluation.training_run import TrainingPlan, train
 from adversarial_lcd_ros.evaluation.training_sources import TrainingSource, with_licences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
@@ -157,6 +159,13 @@ def test_what_cannot_be_trained_on_is_refused_and_leaves_nothing(tour, tmp_path,
     with pytest.raises(kind, match=message):
         train(sources, tmp_path / 'out/models', plan=plan)
     assert list((tmp_path / 'out').iterdir()) == []
+
+
+def test_a_network_without_pytorch_is_refused_before_the_work(tour, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'torch', None)
+    monkeypatch.setattr(training_run, 'open_source', None)
+    with pytest.raises(ModelError, match=r'pip install "adversarial_lcd_ros\[gnn\]"'):
+        train([TrainingSource(tour)], tmp_path / 'models', plan=TrainingPlan(targets=('gnn',)))
 
 
 @pytest.mark.parametrize(('text', 'part'), [

@@ -34,8 +34,7 @@ def _show_bag(bag: BagSummary) -> None:
     from rich.table import Table
 
     console = Console()
-    topics = Table('topic', 'type', 'messages', 'payload',
-                   title=f'{bag.path}: {bag.duration_s:.1f} s', title_justify='left')
+    topics = Table('topic', 'type', 'messages', 'payload')
     graphs = Table('topic', 'nodes n', 'edges m', 'objects',
                    title='graphs: mean (least to largest)', title_justify='left')
     for topic in bag.topics:
@@ -44,6 +43,8 @@ def _show_bag(bag: BagSummary) -> None:
             sizes = (topic.graphs.nodes, topic.graphs.edges, topic.graphs.objects)
             graphs.add_row(topic.name, *(f'{mean:.1f} ({least:.0f} to {largest:.0f})'
                                          for least, mean, largest in sizes))
+    # The title of a table would be broken into lines, and a path be of no use.
+    print(f'{bag.path}: {bag.duration_s:.1f} s')
     console.print(topics)
     if graphs.row_count:
         console.print(graphs)

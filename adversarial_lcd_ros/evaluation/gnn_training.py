@@ -31,6 +31,16 @@ Progress = Callable[[int, int], None]
 Layers = list[tuple['torch.nn.Linear', 'torch.nn.Linear']]
 
 
+def require_pytorch() -> None:
+    """Raise ModelError unless there is what a network is trained with."""
+    try:
+        import onnx  # noqa: F401
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise ModelError(f'the target gnn needs PyTorch to be trained ({error}): pip install '
+                         '"adversarial_lcd_ros[gnn]", or leave it out of --targets') from error
+
+
 def train_gnn(sequences: Sequence[LabelledPairs], path: Path, seed: int,
               progress: Progress | None = None) -> dict[str, Any]:
     """
@@ -54,12 +64,9 @@ def train_gnn(sequences: Sequence[LabelledPairs], path: Path, seed: int,
         PyTorch or onnx is not installed.
 
     """
-    try:
-        import onnx  # noqa: F401
-        import torch
-    except ImportError as error:
-        raise ModelError(f'the target gnn needs PyTorch to be trained ({error}): pip install '
-                         '"adversarial_lcd_ros[gnn]", or leave it out of --targets') from error
+    require_pytorch()
+    import torch
+
     torch.manual_seed(seed)
     torch.use_deterministic_algorithms(True)
     rng = np.random.default_rng(seed)

@@ -18,6 +18,7 @@ from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.gnn_training import require_pytorch
 from adversarial_lcd_ros.evaluation.model_folder import (
     MODEL_CARD,
     SURROGATE_DATA,
@@ -151,7 +152,8 @@ def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
     EvaluationError
         A sequence has no loops, no different places, or is too short. Found before the work.
     ModelError
-        There are too few descriptors for the words, or the folder is taken.
+        There are too few descriptors for the words, the folder is taken, or the target gnn is
+        asked for without PyTorch.
 
     """
     plan = plan or TrainingPlan()
@@ -179,6 +181,8 @@ def _open_all(sources: Sequence[TrainingSource], plan: TrainingPlan) -> list[Tra
     """Open and check everything before the first minute of work."""
     if not sources:
         raise EvaluationError('no sequence to train on: expected at least one')
+    if GnnTarget.name in plan.targets:
+        require_pytorch()
     opened = [open_source(source) for source in sources]
     for source in opened:
         source.check_labels(plan.labels)
