@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.evaluation import gnn_training
+from adversarial_lcd_ros.evaluation.training import gnn as gnn_training
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK, GnnTarget, network_inputs
 from adversarial_lcd_ros.lcd.training import LabelledPairs
 from adversarial_lcd_ros.lcd.views import Comparison, View

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import wilcoxon
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper_ranks import nemenyi_difference, rank_methods
+from adversarial_lcd_ros.evaluation.paper.ranks import nemenyi_difference, rank_methods
 
 METHODS = ('a', 'b', 'c', 'd')
 

@@ -6,7 +6,7 @@ import pytest
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import statistics
-from adversarial_lcd_ros.evaluation.paper_statistics import (
+from adversarial_lcd_ros.evaluation.paper.statistics import (
     ATTACK,
     declines_by_sequence,
     summarise_cells,

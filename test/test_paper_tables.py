@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper_ranks import rank_methods
-from adversarial_lcd_ros.evaluation.paper_tables import (
+from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
+from adversarial_lcd_ros.evaluation.paper.tables import (
     AUTORANK_TABLE,
     BUDGET_TABLE,
     OURS,

@@ -10,9 +10,9 @@ from sweep_factory import walk_folder
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation import workers
-from adversarial_lcd_ros.evaluation.target_recipes import Choices, recipe_sequences
-from adversarial_lcd_ros.evaluation.target_run import trained_on
-from adversarial_lcd_ros.evaluation.target_tables import target_tables
+from adversarial_lcd_ros.evaluation.targets.recipes import Choices, recipe_sequences
+from adversarial_lcd_ros.evaluation.targets.run import trained_on
+from adversarial_lcd_ros.evaluation.targets.tables import target_tables
 
 NOTHING = Choices({}, {}, {})
 

@@ -18,9 +18,9 @@ from adversarial_lcd_ros.errors import (
     ModelError,
     SequenceError,
 )
-from adversarial_lcd_ros.evaluation import training_run
-from adversarial_lcd_ros.evaluation.training_run import TrainingPlan, train
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource, with_licences
+from adversarial_lcd_ros.evaluation.training import run as training_run
+from adversarial_lcd_ros.evaluation.training.run import TrainingPlan, train
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource, with_licences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 

@@ -12,7 +12,7 @@ from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.evaluation.graph_sequences import GraphSequence, Progress, open_graphs
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource, terms_of
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource, terms_of
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.replay import payload_schemas

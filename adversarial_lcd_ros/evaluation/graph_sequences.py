@@ -14,7 +14,7 @@ from adversarial_lcd_ros.codec import decode_graph
 from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.evaluation.graph_cache import cache_key, load_graphs, save_graphs
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.paths import cache_folder
 from adversarial_lcd_ros.replay import Replay, read_payloads

@@ -13,7 +13,7 @@ from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.graph_sequences import GraphSequence, holds_graphs, open_graphs
 from adversarial_lcd_ros.evaluation.labels import FrameLabels, label_frames
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.sequences import open_sequence
 

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper_plots import Curve
-from adversarial_lcd_ros.evaluation.paper_statistics import (
+from adversarial_lcd_ros.evaluation.paper.plots import Curve
+from adversarial_lcd_ros.evaluation.paper.statistics import (
     OPTIMUM,
     Cell,
     Row,
     frame_right,
     summarise_methods,
 )
-from adversarial_lcd_ros.evaluation.paper_views import SETTING
+from adversarial_lcd_ros.evaluation.paper.views import SETTING
 
 _POINTS = 120
 _SHARED = tuple(name for name in SETTING if name not in ('target', 'mode'))

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper_ranks import Ranking
-from adversarial_lcd_ros.evaluation.paper_statistics import OPTIMUM, Cell
-from adversarial_lcd_ros.evaluation.paper_tables import BUDGET_TABLE
-from adversarial_lcd_ros.evaluation.paper_views import DeclineTable
+from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
+from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell
+from adversarial_lcd_ros.evaluation.paper.tables import BUDGET_TABLE
+from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 
 PAPER_SEEDS = 10
 _FEW_FRAMES = 30

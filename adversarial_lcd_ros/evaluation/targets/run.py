@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import statistics
-from adversarial_lcd_ros.evaluation.cells import digest_of, file_digest
 from adversarial_lcd_ros.evaluation.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 from adversarial_lcd_ros.evaluation.metrics import (
     Metrics,
@@ -29,7 +28,8 @@ from adversarial_lcd_ros.evaluation.metrics import (
 from adversarial_lcd_ros.evaluation.offline import run_offline
 from adversarial_lcd_ros.evaluation.pairs import sample_pairs
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.evaluation.sweep.cells import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets import Target, make_target
 from adversarial_lcd_ros.lcd.training import LabelledPairs, PairScorer

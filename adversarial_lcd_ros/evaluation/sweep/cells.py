@@ -24,7 +24,7 @@ from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE
 from adversarial_lcd_ros.paths import model_path
 
 if TYPE_CHECKING:
-    from adversarial_lcd_ros.evaluation.frames import FrameResult
+    from adversarial_lcd_ros.evaluation.sweep.frames import FrameResult
 
 # To be raised whenever the same settings give other figures: finished cells are run again.
 SCHEMA = 1

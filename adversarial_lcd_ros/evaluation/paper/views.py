@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper_ranks import Ranking, rank_methods
-from adversarial_lcd_ros.evaluation.paper_statistics import (
+from adversarial_lcd_ros.evaluation.paper.ranks import Ranking, rank_methods
+from adversarial_lcd_ros.evaluation.paper.statistics import (
     ATTACK,
     OPTIMUM,
     Cell,
     declines_by_sequence,
     summarise_methods,
 )
-from adversarial_lcd_ros.evaluation.paper_tables import (
+from adversarial_lcd_ros.evaluation.paper.tables import (
     BUDGET_TABLE,
     PERTURBATION_TABLE,
     SURROGATE_TABLE,

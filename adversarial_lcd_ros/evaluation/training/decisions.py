@@ -16,9 +16,9 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.gnn_training import train_gnn
 from adversarial_lcd_ros.evaluation.labels import label_frames
 from adversarial_lcd_ros.evaluation.pairs import sample_pairs
+from adversarial_lcd_ros.evaluation.training.gnn import train_gnn
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector

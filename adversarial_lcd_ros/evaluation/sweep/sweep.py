@@ -19,12 +19,12 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import LcdConfig
-from adversarial_lcd_ros.evaluation.cell_store import CellStore
-from adversarial_lcd_ros.evaluation.cells import Cell, cell_key, make_row
-from adversarial_lcd_ros.evaluation.frames import FrameSample, attack_frames, sample_frames
 from adversarial_lcd_ros.evaluation.optimum import Optimum
 from adversarial_lcd_ros.evaluation.results import environment
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
+from adversarial_lcd_ros.evaluation.sweep.cell_store import CellStore
+from adversarial_lcd_ros.evaluation.sweep.cells import Cell, cell_key, make_row
+from adversarial_lcd_ros.evaluation.sweep.frames import FrameSample, attack_frames, sample_frames
 from adversarial_lcd_ros.evaluation.workers import Run
 
 FIRST_SEED = 42

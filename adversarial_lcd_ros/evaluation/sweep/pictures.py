@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.cells import Cell
-from adversarial_lcd_ros.evaluation.frames import FrameResult, attack_frames, sample_frames
 from adversarial_lcd_ros.evaluation.graph_sequences import holds_graphs
 from adversarial_lcd_ros.evaluation.optimum import Optimum
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
-from adversarial_lcd_ros.evaluation.training_sources import TrainingSource
+from adversarial_lcd_ros.evaluation.sweep.cells import Cell
+from adversarial_lcd_ros.evaluation.sweep.frames import FrameResult, attack_frames, sample_frames
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.draw import draw_attack

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.paper_ranks import RankedMethod, Ranking
-from adversarial_lcd_ros.evaluation.paper_statistics import OPTIMUM
-from adversarial_lcd_ros.evaluation.paper_views import DeclineTable
+from adversarial_lcd_ros.evaluation.paper.ranks import RankedMethod, Ranking
+from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM
+from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 from adversarial_lcd_ros.evaluation.plots import GRID, INK, NARROW, STYLE, svg
 
 _COLOURS = {'eigencentrality': '#2f5d8a', 'recall': '#c0392b', 'random_walk': '#d08700',

@@ -18,8 +18,14 @@ from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation.gnn_training import require_pytorch
-from adversarial_lcd_ros.evaluation.model_folder import (
+from adversarial_lcd_ros.evaluation.results import environment
+from adversarial_lcd_ros.evaluation.training.decisions import (
+    TrainingSequence,
+    collect_surrogate_data,
+    train_decision,
+)
+from adversarial_lcd_ros.evaluation.training.gnn import require_pytorch
+from adversarial_lcd_ros.evaluation.training.model_folder import (
     MODEL_CARD,
     SURROGATE_DATA,
     VOCABULARY,
@@ -28,13 +34,7 @@ from adversarial_lcd_ros.evaluation.model_folder import (
     model_folder,
     network_file,
 )
-from adversarial_lcd_ros.evaluation.results import environment
-from adversarial_lcd_ros.evaluation.training import (
-    TrainingSequence,
-    collect_surrogate_data,
-    train_decision,
-)
-from adversarial_lcd_ros.evaluation.training_sources import (
+from adversarial_lcd_ros.evaluation.training.sources import (
     TrainingFrames,
     TrainingSource,
     open_source,

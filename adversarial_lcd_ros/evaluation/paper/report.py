@@ -14,25 +14,19 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation import (
-    paper_figures,
-    paper_plots,
-    paper_views,
-    paper_words,
-    plots,
-    statistics,
-    wording,
-)
-from adversarial_lcd_ros.evaluation.paper_exports import write_exports, write_text
-from adversarial_lcd_ros.evaluation.paper_statistics import (
+from adversarial_lcd_ros.evaluation import plots, statistics, wording
+from adversarial_lcd_ros.evaluation.paper import figures, views, words
+from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
+from adversarial_lcd_ros.evaluation.paper.exports import write_exports, write_text
+from adversarial_lcd_ros.evaluation.paper.statistics import (
     OPTIMUM,
     Cell,
     Row,
     summarise_cells,
     summarise_methods,
 )
-from adversarial_lcd_ros.evaluation.paper_tables import PRINTED_TABLES, misprints
-from adversarial_lcd_ros.evaluation.paper_views import DeclineTable
+from adversarial_lcd_ros.evaluation.paper.tables import PRINTED_TABLES, misprints
+from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.report import data_uri, load_template
 from adversarial_lcd_ros.evaluation.results import REPORT
@@ -69,8 +63,8 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
     if not rows:
         raise EvaluationError(f'{folder}: no cell is finished yet; nothing can be reported')
     cells = summarise_cells(rows)
-    tables = [paper_views.surrogate_tables(cells), paper_views.perturbation_tables(cells),
-              paper_views.budget_tables(cells)]
+    tables = [views.surrogate_tables(cells), views.perturbation_tables(cells),
+              views.budget_tables(cells)]
     write_exports(folder, rows, cells, [table for group in tables for table in group])
     pictures = [(title, caption, data_uri(data, 'jpeg'))
                 for title, caption, data in read_pictures(folder)[:_PICTURES]]
@@ -82,20 +76,20 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
 
 def _values(rows: Sequence[Row], cells: Sequence[Cell],
             tables: Sequence[list[DeclineTable]]) -> dict[str, Any]:
-    ratio = paper_views.main_ratio(cells)
+    ratio = views.main_ratio(cells)
     methods = summarise_methods(cells)
     usual = _usual(cells)
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
-        'headline': paper_words.headline(methods, ratio),
-        'best': paper_words.strongest(here, paper_words.main_target(here)),
-        'warnings': paper_words.warnings(cells, tables[0] + tables[1]),
+        'headline': words.headline(methods, ratio),
+        'best': words.strongest(here, words.main_target(here)),
+        'warnings': words.warnings(cells, tables[0] + tables[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
         'usual': ', '.join(words.format(usual[name]) for name, words in _WORDS.items()
                            if usual[name] != ''),
-        'verdicts': [(name, paper_words.verdict(group[0])) for name, group in zip(
+        'verdicts': [(name, words.verdict(group[0])) for name, group in zip(
             ('Surrogates', 'Perturbations'), tables, strict=False) if group],
         'surrogates': _blocks(tables[0]), 'perturbations': _blocks(tables[1]),
         'budgets': _blocks(tables[2]), 'notes': _notes(),
@@ -113,16 +107,16 @@ def _plots(rows: Sequence[Row], cells: Sequence[Cell], tables: Sequence[list[Dec
     settings = [table.setting for group in tables[1::-1] for table in group]
     guided = next((setting for setting in settings if setting['mode'] == 'query'), None)
     if guided is not None:
-        curves = paper_figures.query_curves(rows, guided, ratio)
+        curves = figures.query_curves(rows, guided, ratio)
         if curves:
             values['success_plot'] = _plot(lambda width: paper_plots.success_curves(curves, width))
-            values['success_setting'] = paper_views.setting_title(guided)
+            values['success_setting'] = views.setting_title(guided)
     if settings:
-        shares, perturbations = paper_figures.optimum_shares(cells, settings[0], ratio)
+        shares, perturbations = figures.optimum_shares(cells, settings[0], ratio)
         if shares:
             values['share_plot'] = _plot(
                 lambda width: paper_plots.optimum_shares(shares, perturbations, width))
-    targets = paper_figures.target_map(cells, ratio)
+    targets = figures.target_map(cells, ratio)
     if targets is not None:
         values['map_plot'] = _plot(lambda width: paper_plots.heat_map(
             targets.attacks, targets.targets, targets.declines, width))
@@ -143,7 +137,7 @@ def _blocks(tables: Sequence[DeclineTable]) -> list[dict[str, Any]]:
         plot = None if table.ranking is None else _plot(
             partial(paper_plots.critical_difference, table.ranking),
             _BESIDE if beside else plots.WIDE)
-        blocks.append({'table': table, 'verdict': paper_words.verdict(table), 'plot': plot,
+        blocks.append({'table': table, 'verdict': words.verdict(table), 'plot': plot,
                        'beside': beside})
     return blocks
 
@@ -187,7 +181,7 @@ def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, s
     rows: dict[str, list[dict[str, str]]] = {}
     left = list(methods)
     while left:
-        target = paper_words.main_target(left)
+        target = words.main_target(left)
         there = [method for method in left if method['target'] == target]
         left = [method for method in left if method['target'] != target]
         rows[str(target)] = [

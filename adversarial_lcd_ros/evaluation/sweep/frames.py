@@ -23,9 +23,9 @@ from adversarial_lcd_ros.attack.oracle import Ask
 from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.cells import Cell
 from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE, FrameLabels
 from adversarial_lcd_ros.evaluation.optimum import Optimum
+from adversarial_lcd_ros.evaluation.sweep.cells import Cell
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 

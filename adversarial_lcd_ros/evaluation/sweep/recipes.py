@@ -23,9 +23,9 @@ from typing import Any, ClassVar
 
 from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, Config, setting
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.cells import ORACLES, Cell
 from adversarial_lcd_ros.evaluation.optimum import Optimum
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+from adversarial_lcd_ros.evaluation.sweep.cells import ORACLES, Cell
 
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))

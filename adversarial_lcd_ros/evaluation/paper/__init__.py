@@ -1,0 +1,1 @@
+"""The experiments of the paper: statistics over sequences, ranks, tables, figures, report."""

@@ -1,0 +1,1 @@
+"""Many attacks on sampled frames of many sequences: cells, resumable, side by side."""

@@ -1,0 +1,1 @@
+"""Detectors before any attack."""

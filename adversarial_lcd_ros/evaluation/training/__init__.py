@@ -1,0 +1,1 @@
+"""Vocabulary, decisions and surrogate data from sequences with ground truth."""
