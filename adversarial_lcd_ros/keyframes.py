@@ -136,14 +136,22 @@ class Database:
         while len(new := np.flatnonzero(level >= cut)):
             level[new] = 0
             ranked, score = np.append(ranked, new), np.append(score, self._scores(query, new))
-            order = np.lexsort((ranked, -score))
-            ranked, score = ranked[order], score[order]
+            ranked, score = _by_score(ranked, score)
             chosen = _spread(ranked, count, window)
             cut = query.least_level(score[chosen[-1]]) if len(chosen) == count else 1
-        if len(chosen) < count:
-            ranked, score = np.append(ranked, unlike), np.append(score, np.zeros(len(unlike)))
+        # Levels in common may be those of two words in one column: a score can be 0 there, too.
+        if len(chosen) < count or score[chosen[-1]] == 0:
+            ranked, score = _by_score(np.append(ranked, unlike),
+                                      np.append(score, np.zeros(len(unlike))))
             chosen = _spread(ranked, count, window)
         return ranked[chosen].tolist(), score[chosen].tolist()
+
+
+def _by_score(keyframes: NDArray[np.int64], score: NDArray[np.float64]
+              ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return keyframes and scores by falling score, the older of equals first."""
+    order = np.lexsort((keyframes, -score))
+    return keyframes[order], score[order]
 
 
 def _largest(level: NDArray[np.uint32], count: int) -> int:

@@ -49,6 +49,16 @@ def by_sorting(stored, query, admissible, count, window):
     return chosen, score[chosen].tolist()
 
 
+def test_a_column_in_common_is_no_word_in_common(monkeypatch):
+    monkeypatch.setattr(keyframe_blocks, 'COLUMNS', 2)
+    database = Database()
+    for words in ({0: 0.5}, {1: 0.5}, {2: 0.5, 3: 0.5}):
+        database.add(with_words(words))
+    # Words 1 and 3 share a column; of two keyframes with score 0 the older one comes first.
+    assert database.retrieve(with_words({3: 0.5}), np.array([True, True, False]), 1) == (
+        [0], [0.0])
+
+
 @given(st.one_of(*VECTORS), st.integers(1, 4), st.integers(0, 2), st.integers(1, 4),
        st.sampled_from([5, 4096]), st.randoms())
 @settings(deadline=None, max_examples=60)
