@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 # Graphs to replay where a bag has no images; the clean ones are what came before any attack.
 GRAPH_TOPICS = ('graph_clean', 'graph')
+DETECTIONS_TOPIC = 'detections'
 
 
 class Replay:
@@ -45,8 +46,8 @@ class Replay:
     The messages of one replay of a bag, in order.
 
     Frames are the camera images; in a bag without any, the graphs on graph_clean, else on
-    graph. Of the rest only poses (ground truth) are replayed: what the pipeline itself has
-    published, and /clock, would meet the pipeline's own.
+    graph. Of the rest poses (ground truth) and detections (of the user's own detector) are
+    replayed: what the pipeline itself has published, and /clock, would meet the pipeline's own.
 
     Iterating gives (topic, message type, stamp in nanoseconds, CDR). The stamp is that of the
     message's header. When a replay loops, the stamps in the messages go on rising.
@@ -56,7 +57,8 @@ class Replay:
     path : Path
         A rosbag2: its folder, or its .mcap or .db3 file.
     config : ReplayConfig
-        start_s and duration_s count from the first frame; stride leaves out frames, not poses.
+        start_s and duration_s count from the first frame; stride leaves out frames and nothing
+        else.
 
     Attributes
     ----------
@@ -82,9 +84,10 @@ class Replay:
                 raise SequenceError(f'{path} is a bag of ROS 1: make one of ROS 2 with '
                                     '"adversarial-lcd import"')
             self._frame_topic = _frame_topic(bag)
-            self._pose_topics = bag.of_type(POSE)
+            self._beside = [*bag.of_type(POSE), *(topic for topic in bag.of_type(PAYLOAD)
+                                                  if _name(topic) == DETECTIONS_TOPIC)]
             self.topics = {topic: bag.topics[topic]
-                           for topic in (self._frame_topic, *self._pose_topics)}
+                           for topic in (self._frame_topic, *self._beside)}
             self.frame_topics = (self._frame_topic,)
             stamps = check_order(
                 [_stamp_ns(bag.topics[topic], wire)
@@ -119,9 +122,9 @@ class Replay:
     def _once(self) -> Iterator[tuple[str, int, bytes]]:
         # Bags are in order of arrival, a replay in order of the stamps: /clock must not go back.
         with BagFile(self._path) as bag:
-            poses = [(topic, cdr_stamp_ns(wire), wire)
-                     for topic, _, wire in bag.messages(self._pose_topics)]
-            kept = (row for row in poses if self._first_ns <= row[1] < self._end_ns)
+            beside = [(topic, _stamp_ns(self.topics[topic], wire), wire)
+                      for topic, _, wire in bag.messages(self._beside)]
+            kept = (row for row in beside if self._first_ns <= row[1] < self._end_ns)
             yield from heapq.merge(sorted(kept, key=lambda row: row[1]), self._frames(bag),
                                    key=lambda row: row[1])
 
@@ -139,13 +142,17 @@ def _frame_topic(bag: BagFile) -> str:
                             'with "adversarial-lcd import"')
     if images:
         return images[0]
-    graphs = {topic.rsplit('/', 1)[-1]: topic for topic in bag.of_type(PAYLOAD)}
+    graphs = {_name(topic): topic for topic in bag.of_type(PAYLOAD)}
     for name in GRAPH_TOPICS:
         if name in graphs:
             return graphs[name]
     there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(bag.topics.items()))
     raise SequenceError(f'bag {bag.path} has neither images nor graphs to replay; it has '
                         f'{there or "no topics"}')
+
+
+def _name(topic: str) -> str:
+    return topic.rsplit('/', 1)[-1]
 
 
 def _stamp_ns(message_type: str, wire: bytes) -> int:

@@ -101,6 +101,29 @@ def test_stamps_go_on_rising_from_loop_to_loop(bag, settings):
         assert wire(message, kind) == original, topic
 
 
+def detections(stamp_ns):
+    return codec.FrameDetections(stamp_ns, 'camera', np.array([3], np.uint32),
+                                 np.array([[1, 2, 30, 40]], np.float32),
+                                 np.array([0.75], np.float32))
+
+
+def test_detections_are_replayed_before_their_frame(tmp_path):
+    found_by_user = [('/robot/detections', PAYLOAD, stamp + 40_000_000,
+                      payload_message(codec.encode_detections(detections(stamp))))
+                     for stamp in stamps(4)]
+    ours = [('/loop_closures', PAYLOAD, 1, payload_message(b'of an earlier run'))]
+    bag = make.write_ros2(tmp_path / 'bag', make.jpeg_rows(4) + found_by_user + ours)
+    replay = Replay(bag, ReplayConfig(loop=2))
+    assert replay.frame_topics == ('/image/compressed',)
+    rows = list(replay)
+    assert [row[0] for row in rows] == ['/robot/detections', '/image/compressed'] * 8
+    assert rows[0][3] == wire(found_by_user[0][3], PAYLOAD)
+    for topic, kind, stamp, cdr in rows:
+        if topic == '/robot/detections':
+            read_back = codec.decode_detections(bytes(read(cdr, kind).data))
+            assert (read_back.stamp_ns, read_back.box.tolist()) == (stamp, [[1, 2, 30, 40]])
+
+
 def test_graphs_are_frames_where_there_are_no_images(tmp_path):
     others = [('/loop_closures', PAYLOAD, stamp, payload_message(b'x')) for stamp in stamps()]
     rows = graph_rows('/graph') + graph_rows('/graph_clean') + others
