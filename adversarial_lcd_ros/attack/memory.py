@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.optimize import linear_sum_assignment
 
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -99,9 +98,11 @@ def _match_objects(graph: MultiTierGraph, past: MultiTierGraph, node: NDArray[np
     objects, olds = graph.object_count, past.object_count
     source, target = past.edge.astype(np.int64).T
     held = (source < olds) & (node[target] >= 0)
-    holds = sparse.csr_array((alike[target[held]], (node[target[held]], source[held])),
-                             shape=(graph.node_count, olds))
-    common = (graph.adjacency[:objects] @ holds).toarray()
+    holds = np.zeros((graph.node_count, olds))
+    holds[node[target[held]], source[held]] = alike[target[held]]
+    joined = np.zeros((objects, graph.node_count))
+    joined[tuple(graph.edge[graph.edge[:, 0] < objects].T)] = 1
+    common = np.einsum('of,fp->op', joined, holds)
     same = graph.label[:objects, None] == past.label[None, :olds]
     rows, columns = linear_sum_assignment(np.where(same, 1 + common, 0), maximize=True)
     kept = same[rows, columns]
