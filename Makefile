@@ -9,8 +9,10 @@
 PYTHON ?= python3
 ARGS ?=
 DATA ?= ../shared/data
-PAPER ?= flat_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy@0.5:1 \
+PAPER ?= flat_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy \
   rgbd_dataset_freiburg3_long_office_household
+TRAIN ?= flat_train
+PAPER_MODELS ?= results/paper_models
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
@@ -27,12 +29,17 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 demo: model
 	$(BIN)/adversarial-lcd demo $(ARGS)
 
-# Half of freiburg1_rpy: the target was trained on the other one.
-paper: model
+# The models that ship have seen half of freiburg1_rpy; here detectors have seen TRAIN and nothing
+# else. PAPER_MODELS=adversarial_lcd_ros/models takes those that ship.
+paper: model $(PAPER_MODELS)/MODEL_CARD.json
 	@for sequence in $(PAPER); do test -e "$(DATA)/$${sequence%@*}" || { echo \
 	  "error: there is no $(DATA)/$${sequence%@*}; make paper DATA=FOLDER, or PAPER='NAME ...' for others" \
 	  >&2; exit 1; }; done
-	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper --output results/paper $(ARGS)
+	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper \
+	  --models $(PAPER_MODELS) --output results/paper $(ARGS)
+
+$(PAPER_MODELS)/MODEL_CARD.json: | model
+	$(BIN)/adversarial-lcd train $(TRAIN:%=$(DATA)/%) --targets wl anchored objects --output $(@D)
 
 target: model
 	$(BIN)/adversarial-lcd targets --recipe target --data $(DATA) --output results/target $(ARGS)

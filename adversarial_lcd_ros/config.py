@@ -131,7 +131,8 @@ class LcdConfig(Config):
     title: ClassVar[str] = 'lcd'
 
     target: str = setting('wl', 'How two graphs are compared.', choices=TARGETS)
-    model: str = setting('', 'Trained target (JSON); empty: the one that ships.')
+    model: str = setting(
+        '', 'Trained target (JSON), or the folder of a training; empty: the one that ships.')
     candidates: int = setting(
         5, 'Keyframes that vBoW retrieves for the graph to decide on.', low=1, high=1000)
     min_gap_s: float = setting(

@@ -9,6 +9,7 @@ from adversarial_lcd_ros.errors import ModelError
 
 PACKAGE = 'adversarial_lcd_ros'
 OBJECT_MODEL = 'picodet_s_coco.onnx'
+VOCABULARY, SURROGATE_DATA = 'vocabulary.npz', 'surrogate_data.npz'
 _HERE = Path(__file__).resolve().parent
 
 
@@ -42,6 +43,24 @@ def model_path(name: str) -> Path:
         shipped = ', '.join(sorted(p.name for p in path.parent.glob('*.*'))) or 'none'
         raise ModelError(f'no shipped model {name!r}; there are: {shipped}')
     return path
+
+
+def target_path(chosen: str, target: str) -> Path:
+    """
+    Return the file of a trained target.
+
+    Parameters
+    ----------
+    chosen : str
+        That file, or a folder of a training that holds it; empty: the one that ships.
+    target : str
+
+    """
+    name = f'target_{target}.json'
+    if not chosen:
+        return model_path(name)
+    path = Path(chosen)
+    return path / name if path.is_dir() else path
 
 
 def cache_folder() -> Path:

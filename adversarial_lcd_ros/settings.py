@@ -30,6 +30,7 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 
 # The parameters of a node are the settings of its classes.
 NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
@@ -40,6 +41,11 @@ NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
 }
 # The sections of a settings file.
 SECTIONS: Mapping[str, tuple[type[Config], ...]] = {**NODE_CONFIGS, 'labels': (LabelConfig,)}
+
+# Settings that name trained artefacts, and their files in the folder of a training.
+_TRAINED: Mapping[type[Config], tuple[str, str]] = {
+    BuilderConfig: ('vocabulary', VOCABULARY), LcdConfig: ('model', ''),
+    AttackConfig: ('surrogate_data', SURROGATE_DATA)}
 
 _ANY_NAMESPACE = '/**/'
 _HEADER = """\
@@ -178,14 +184,40 @@ def config_from_options(options: Namespace, config_class: type[ConfigT]) -> Conf
     return config_class.from_mapping(chosen_settings(options, config_class))
 
 
+def add_models_option(parser: ArgumentParser) -> None:
+    """Give a parser the option ``--models``: all trained artefacts at once."""
+    parser.add_argument('--models', type=Path, metavar='FOLDER',
+                        help='what "train" has written, in place of the models that ship; '
+                        'settings of single files win over it')
+
+
 def chosen_settings(options: Namespace, config_class: type[Config]) -> dict[str, Any]:
-    """Return the settings of a class that the command line or the ``--config`` file names."""
-    values = dict(_from_file(options, config_class))
+    """
+    Return the settings of a class that the command line or the ``--config`` file names.
+
+    Raises
+    ------
+    ConfigError
+        The file is not one, or ``--models`` is no folder of a training.
+
+    """
+    values = dict(_from_file(options, config_class)) | _from_models(options, config_class)
     for entry in fields(config_class):
         destination = _destination(config_class, entry)
         if hasattr(options, destination):
             values[entry.name] = getattr(options, destination)
     return values
+
+
+def _from_models(options: Namespace, config_class: type[Config]) -> dict[str, Any]:
+    folder: Path | None = getattr(options, 'models', None)
+    if folder is None or config_class not in _TRAINED:
+        return {}
+    name, file = _TRAINED[config_class]
+    if not (folder / VOCABULARY).is_file():
+        raise ConfigError(f'--models {folder}: expected a folder that "adversarial-lcd train" '
+                          f'has written, with {VOCABULARY} in it')
+    return {name: str(folder / file)}
 
 
 def _from_file(options: Namespace, config_class: type[Config]) -> Iterator[tuple[str, Any]]:

@@ -19,6 +19,7 @@ from adversarial_lcd_ros.settings import (
     NODE_CONFIGS,
     SECTIONS,
     add_config_options,
+    add_models_option,
     config_from_options,
     load_settings,
     render_parameters,
@@ -97,6 +98,7 @@ def test_parameters_of_a_node_have_distinct_names():
 def parse(arguments, *configs):
     parser = ArgumentParser()
     parser.add_argument('--config', type=Path)
+    add_models_option(parser)
     for config, prefix in configs:
         add_config_options(parser, config, prefix)
     return parser.parse_args(arguments)
@@ -108,6 +110,20 @@ def test_command_line_wins_over_file_and_file_over_default(tmp_path):
     options = parse(['--config', str(file), '--ratio', '0.002'], (AttackConfig, ''))
     config = config_from_options(options, AttackConfig)
     assert (config.ratio, config.seed, config.mode) == (0.002, 7, AttackConfig().mode)
+
+
+def test_a_folder_of_models_gives_all_that_is_trained(tmp_path):
+    sections = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''))
+    arguments = ['--models', str(tmp_path), '--builder-vocabulary', 'mine.npz']
+    options = parse(arguments, *sections)
+    with pytest.raises(ConfigError, match=r'"adversarial-lcd train" has written, with vocab'):
+        config_from_options(options, LcdConfig)
+    (tmp_path / 'vocabulary.npz').touch()
+    assert config_from_options(options, BuilderConfig) == BuilderConfig(vocabulary='mine.npz')
+    assert config_from_options(options, LcdConfig).model == str(tmp_path)
+    assert config_from_options(options, AttackConfig).surrogate_data == str(
+        tmp_path / 'surrogate_data.npz')
+    assert config_from_options(options, LabelConfig) == LabelConfig()
 
 
 def test_settings_of_the_same_name_are_told_apart():

@@ -276,6 +276,17 @@ def test_a_wrong_model_is_refused(tmp_path, text, said):
         LoopClosureDetector(LcdConfig(model=str(path)))
 
 
+def test_a_folder_of_trained_targets_serves_each(tmp_path):
+    for target, bias in (('vbow', 1.0), ('descriptors', 2.0)):
+        channels = make_target(target).channels
+        Decision(target, channels, (1.0,) * len(channels), bias).save(
+            tmp_path / f'target_{target}.json')
+        detector = LoopClosureDetector(LcdConfig(target=target, model=str(tmp_path)))
+        assert detector.decision.bias == bias
+    with pytest.raises(ModelError, match=r'target_wl\.json is no trained decision'):
+        LoopClosureDetector(LcdConfig(model=str(tmp_path)))
+
+
 def test_an_unknown_target_is_refused():
     with pytest.raises(ConfigError, match='wl'):
         make_target('nonesuch')

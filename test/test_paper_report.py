@@ -195,6 +195,15 @@ def test_sequences_without_a_column_are_left_out_and_told():
     assert any('synthetic_office without a figure' in text for text in texts)
 
 
+def test_a_sequence_that_trained_the_detector_is_no_test_of_it():
+    seen = SEQUENCES[0], 'wl'
+    rows = [make_row(sequence, target=target, trained_on=(sequence, target) == seen)
+            for sequence in SEQUENCES[:2] for target in ('wl', 'edges')]
+    texts = [text for text in words.warnings(summarise_cells(rows), []) if 'training' in text]
+    assert texts == [f'{SEQUENCES[0]} was seen in training by wl: it is no test of what they are '
+                     'worth.']
+
+
 def test_warnings():
     rows = [make_row(SEQUENCES[0], positives=60), make_row(SEQUENCES[1], frames=40),
             make_row(SEQUENCES[2], nodes=50)]

@@ -115,6 +115,21 @@ def test_a_sequence_without_new_places_has_no_decline():
     assert summarise_methods(cells) == []
 
 
+def test_a_sequence_that_allows_no_edit_is_in_no_mean():
+    rows = [make_row(sequence, nodes_mean=nodes, power=0.5 if nodes > 100 else 0.0,
+                     unattackable=0 if nodes > 100 else 60)
+            for sequence, nodes in zip(SEQUENCES[:3], (300, 300, 7), strict=True)]
+    cells = summarise_cells(rows)
+    assert [cell['decline_pp'] for cell in cells].count(0) == 1
+    method, = summarise_methods(cells)
+    assert method['sequences'] == sorted(SEQUENCES[:2])
+    assert method['decline_pp'] > 30
+    name = tuple(method[factor] for factor in ATTACK)
+    assert set(declines_by_sequence(cells, {name: 'a'})['a']) == set(SEQUENCES[:2])
+    alone, = summarise_methods(summarise_cells(rows[2:]))
+    assert (alone['decline_pp'], alone['unattackable']) == (0, 60)
+
+
 def test_ranks_need_complete_rows():
     rows = [make_row(sequence, perturbation=perturbation) for sequence in SEQUENCES
             for perturbation in ('eigencentrality', 'random_walk')][:-1]

@@ -3,7 +3,6 @@
 from contextlib import contextmanager
 import json
 
-import numpy as np
 import pytest
 from sweep_factory import walk_folder
 
@@ -11,8 +10,9 @@ from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation import workers
 from adversarial_lcd_ros.evaluation.targets.recipes import Choices, recipe_sequences
-from adversarial_lcd_ros.evaluation.targets.run import trained_on
 from adversarial_lcd_ros.evaluation.targets.tables import target_tables
+from adversarial_lcd_ros.evaluation.training.model_folder import trained_on
+from adversarial_lcd_ros.paths import model_path
 
 NOTHING = Choices({}, {}, {})
 
@@ -117,17 +117,24 @@ def test_the_recipe_that_ships_is_one(tmp_path):
     assert len({sequence.source for sequence in sequences}) == len(sequences) == 5
 
 
+SHIPPED = model_path('target_wl.json')
+
+
 @pytest.mark.parametrize(('source', 'seen'), [
     ('x/flat_train', True), ('x/flat_tour', False), ('rgbd_dataset_freiburg1_rpy', True),
     ('rgbd_dataset_freiburg1_rpy@0.5:1', False), ('rgbd_dataset_freiburg1_rpy@0.4:1', True)])
 def test_the_card_tells_what_was_trained_on(source, seen):
-    assert np.bool_(trained_on(source)) == seen
+    assert trained_on(SHIPPED, source) is seen
+
+
+def test_without_a_card_nobody_knows(tmp_path):
+    assert trained_on(tmp_path / 'target_wl.json', 'x/flat_train') is None
 
 
 def test_a_map_may_be_trained_on_where_the_queries_are_not():
     source = 'rgbd_dataset_freiburg1_rpy'
-    assert not trained_on(source, (0.5, 1))
-    assert trained_on(source, (0, 1))
+    assert not trained_on(SHIPPED, source, (0.5, 1))
+    assert trained_on(SHIPPED, source, (0, 1))
     row = {'sequence': source, 'target': 'wl', 'protocol': 'pairs', 'nodes': 300,
            'nodes_mean': 305.0, 'scored': [0.5, 1], 'trained_on': False,
            'references_trained_on': True, 'geometric_check': False, 'n_pairs': 0,

@@ -19,7 +19,7 @@ from adversarial_lcd_ros.codec import AttackReport
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Attacker:
 
     def _data(self) -> SurrogateData:
         chosen = self.config.surrogate_data
-        return SurrogateData.load(Path(chosen) if chosen else model_path('surrogate_data.npz'))
+        return SurrogateData.load(Path(chosen) if chosen else model_path(SURROGATE_DATA))
 
     def process(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
         """

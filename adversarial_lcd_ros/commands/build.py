@@ -7,7 +7,7 @@ from pathlib import Path
 
 from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
 from adversarial_lcd_ros.config import BuilderConfig
-from adversarial_lcd_ros.settings import add_config_options, config_from_options
+from adversarial_lcd_ros.settings import add_config_options, add_models_option, config_from_options
 
 
 def add(commands: Commands) -> None:
@@ -26,6 +26,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML) of graph_builder; options of the command line win '
                         'over it')
+    add_models_option(parser)
     # argparse's own usage would be twenty options long before the first explanation.
     parser.usage = f'{parser.prog} SOURCE DESTINATION [OPTIONS]'
     add_config_options(parser, BuilderConfig)

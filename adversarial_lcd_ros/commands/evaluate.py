@@ -17,7 +17,12 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.settings import add_config_options, chosen_settings, config_from_options
+from adversarial_lcd_ros.settings import (
+    add_config_options,
+    add_models_option,
+    chosen_settings,
+    config_from_options,
+)
 
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
@@ -70,6 +75,7 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         '(also label_sweep.csv)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
+    add_models_option(parser)
     for config_class, prefix in EVALUATED:
         add_config_options(parser, config_class, prefix)
 

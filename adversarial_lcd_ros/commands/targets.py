@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar, tell
 from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.settings import add_config_options, chosen_settings
+from adversarial_lcd_ros.settings import add_config_options, add_models_option, chosen_settings
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.streams import Stream
@@ -59,6 +59,7 @@ def add(commands: Commands) -> None:
                         help='where built graphs are kept (default: in the cache of the user)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
+    add_models_option(parser)
     for config, prefix in _CONFIGS:
         add_config_options(parser, config, prefix)
 

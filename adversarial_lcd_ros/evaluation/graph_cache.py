@@ -21,7 +21,7 @@ from adversarial_lcd_ros.codec import decode_graph, encode_graph, schema_text
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import CodecError, EvaluationError, ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.paths import model_path, object_model_path
+from adversarial_lcd_ros.paths import VOCABULARY, model_path, object_model_path
 from adversarial_lcd_ros.sequences import Sequence
 
 # What decides on the bytes of a graph beside the code of this package.
@@ -64,7 +64,7 @@ def cache_key(sequence: Sequence, numbers: range, config: BuilderConfig) -> str:
 
 
 def _named_files(config: BuilderConfig) -> list[Path]:
-    files = [Path(config.vocabulary) if config.vocabulary else model_path('vocabulary.npz')]
+    files = [Path(config.vocabulary) if config.vocabulary else model_path(VOCABULARY)]
     if config.detector == 'onnx':
         files.append(Path(config.model) if config.model else object_model_path())
     if config.detector == 'csv' and config.detections:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.geometry import count_inliers
 from adversarial_lcd_ros.lcd.targets import Scores, make_target, prepare
 from adversarial_lcd_ros.lcd.views import Comparison, View
-from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.paths import target_path
 
 CACHED_VIEWS = 256
 
@@ -70,9 +69,8 @@ class LoopClosureDetector:
 
     def __init__(self, config: LcdConfig | None = None) -> None:
         self.config = config or LcdConfig()
-        chosen = Path(self.config.model) if self.config.model else None
-        self._target = make_target(self.config.target, chosen and chosen.with_suffix('.onnx'))
-        path = chosen or model_path(f'target_{self.config.target}.json')
+        path = target_path(self.config.model, self.config.target)
+        self._target = make_target(self.config.target, path.with_suffix('.onnx'))
         self.decision = Decision.load(path, self._target.name, self._target.channels)
         self._database = Database()
         self._view = lru_cache(CACHED_VIEWS)(lambda index: View(self._database[index]))

@@ -57,6 +57,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
     list of dict
         ``CELL``; means over the seeds of the figures; and
 
+        * ``trained_on``: the detector was trained on frames of the sequence; None if unknown
         * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
         * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
@@ -96,9 +97,10 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
     Returns
     -------
     list of dict
-        ``ATTACK``; ``sequences`` (names, those with a decline), ``decline_pp`` (mean),
-        ``ci95`` (Student's t over the sequences, cut at the possible -100 and 100, None below
-        two: resampling so few gives intervals that are too narrow), ``least_pp``, ``most_pp``,
+        ``ATTACK``; ``sequences`` (names; those that are ``is_attackable``, if any is),
+        ``decline_pp`` (mean), ``ci95`` (Student's t over the sequences, cut at the possible -100
+        and 100, None below two: resampling so few gives intervals that are too narrow),
+        ``least_pp``, ``most_pp``,
         ``share_of_optimum`` (of the means, over the sequences that have both); means of the
         accuracies, of edits and queries; sums of the counts.
 
@@ -108,8 +110,19 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
         if cell['decline_pp'] is not None:
             groups[tuple(cell[name] for name in ATTACK)].append(cell)
     best = _optima(cells)
-    return [{**dict(zip(ATTACK, key, strict=True)), **_over_sequences(groups[key], best)}
+    return [{**dict(zip(ATTACK, key, strict=True)),
+             **_over_sequences(list(filter(is_attackable, groups[key])) or groups[key], best)}
             for key in sorted(groups, key=_sort_key)]
+
+
+def is_attackable(cell: Cell) -> bool:
+    """
+    Tell whether a cell says anything of an attack.
+
+    It does not where a kind of frame is missing, nor where no frame's graph is large enough for
+    one edit.
+    """
+    return cell['decline_pp'] is not None and cell['unattackable'] < cell['frames']
 
 
 def declines_by_sequence(cells: Iterable[Cell],
@@ -123,7 +136,7 @@ def declines_by_sequence(cells: Iterable[Cell],
     table: dict[str, dict[str, float]] = {title: {} for title in name.values()}
     for cell in cells:
         title = name.get(tuple(cell[factor] for factor in ATTACK))
-        if title is not None and cell['decline_pp'] is not None:
+        if title is not None and is_attackable(cell):
             table[title][cell['sequence']] = cell['decline_pp']
     common = set.intersection(*map(set, table.values())) if table else set()
     return {title: {sequence: declines[sequence] for sequence in sorted(common)}
@@ -163,6 +176,7 @@ def _summarise(rows: Sequence[Row]) -> Cell:
     positive, negative = _right_before(rows)
     cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
     cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
+                trained_on=rows[0].get('trained_on'),
                 decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
                 ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
                 duration_s=math.fsum(row['duration_s'] for row in rows))

@@ -18,6 +18,7 @@ from adversarial_lcd_ros.evaluation.paper.statistics import (
     OPTIMUM,
     Cell,
     declines_by_sequence,
+    is_attackable,
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import (
@@ -83,7 +84,7 @@ class DeclineTable:
     lines : tuple of Line
         By sequence (Tables 3 and 5) or by ratio (Table 6, means over the sequences).
     mean : Line or None
-        Over the sequences that all columns have.
+        Over the sequences that all columns have, and that allow an edit.
     ranking : Ranking or None
         Of the columns but the yardstick; None below two columns or sequences.
 
@@ -200,7 +201,7 @@ def _tables(cells: Sequence[Cell], printed: PrintedTable,
         lines = tuple(Line(sequence, tuple(at.get((sequence, value)) for value in values))
                       for sequence in sequences)
         whole = [line.title for line in lines
-                 if all(entry and entry['decline_pp'] is not None for entry in line.entries)]
+                 if all(entry and is_attackable(entry) for entry in line.entries)]
         means = {column(method): method for method in summarise_methods(
             [cell for cell in group if cell['sequence'] in whole])}
         mean = (Line('mean', tuple(means[value] for value in values)) if whole else None)

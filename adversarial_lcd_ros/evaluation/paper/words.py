@@ -8,7 +8,7 @@ from itertools import pairwise
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
-from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell
+from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell, is_attackable
 from adversarial_lcd_ros.evaluation.paper.tables import BUDGET_TABLE
 from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 
@@ -156,12 +156,14 @@ def warnings(cells: Sequence[Cell], tables: Sequence[DeclineTable]) -> list[str]
     texts += _separation(tables)
     texts += _incomplete(tables)
     texts += _frames(cells)
+    texts += _trained(cells)
     cut = [cell for cell in cells if cell['unattackable']]
     if cut:
         share = sum(cell['unattackable'] for cell in cut) / sum(cell['frames'] for cell in cut)
         texts.append(f'Frames that allow no edit or could not be attacked are in {len(cut)} of '
                      f'{len(cells)} cells, {wording.percent(share)} of their frames. They are in '
-                     'every figure, as frames that no attack changed.')
+                     'every figure of their sequence, as frames that no attack changed; a '
+                     'sequence of nothing else is in no mean over sequences.')
     return texts
 
 
@@ -181,11 +183,20 @@ def _incomplete(tables: Sequence[DeclineTable]) -> list[str]:
     texts = []
     for table in tables:
         lost = [line.title for line in table.lines
-                if any(entry is None or entry['decline_pp'] is None for entry in line.entries)]
+                if any(entry is None or not is_attackable(entry) for entry in line.entries)]
         if lost and table.mean is not None:
             texts.append(f'Table {table.printed.number} ({table.title}): {", ".join(lost)} '
-                         'without a figure for some column; not in the mean and the ranks.')
+                         'without a figure, or without a frame that allows an edit, in some '
+                         'column; not in the mean and the ranks.')
     return texts
+
+
+def _trained(cells: Sequence[Cell]) -> list[str]:
+    seen = {cell['sequence']: sorted({other['target'] for other in cells if other['trained_on']
+                                      and other['sequence'] == cell['sequence']})
+            for cell in cells}
+    return [f'{sequence} was seen in training by {", ".join(targets)}: it is no test of what they '
+            'are worth.' for sequence, targets in sorted(seen.items()) if targets]
 
 
 def _frames(cells: Sequence[Cell]) -> list[str]:

@@ -21,17 +21,19 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE
-from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path, target_path
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.sweep.frames import FrameResult
 
 # To be raised whenever the same settings give other figures: finished cells are run again.
-SCHEMA = 1
+SCHEMA = 2
 ORACLES = ('soft', 'hard')
 _TRACE_POINTS = 8
 # Attack settings that have columns of their own.
 _COLUMNS = ('mode', 'perturbation', 'surrogate', 'ratio', 'edits', 'queries_per_edit', 'seed')
+# Files count by their content.
+_FILES = ('surrogate_data',)
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,10 @@ class Cell:
     @property
     def variant(self) -> str:
         """Settings of the attack without a column of their own that are not the usual ones."""
-        return ', '.join(f'{entry.name} {getattr(self.attack, entry.name)}'
-                         for entry in fields(AttackConfig) if entry.name not in _COLUMNS
-                         and getattr(self.attack, entry.name) != entry.default)
+        values = asdict(self.attack)
+        return ', '.join(f'{entry.name} {values[entry.name]}' for entry in fields(AttackConfig)
+                         if entry.name not in _COLUMNS + _FILES
+                         and values[entry.name] != entry.default)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -106,7 +109,7 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     detector = {name: value for name, value in asdict(lcd).items()
                 if name not in ('target', 'hard_answers', 'model')}
     attack = {name: value for name, value in asdict(cell.attack).items()
-              if name not in ('seed', 'surrogate_data')}
+              if name not in ('seed', *_FILES)}
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
               'detector': detector, 'attack': attack, **cell.settings,
               'files': [file_digest(path) for path in _files(cell, lcd)]}
@@ -114,11 +117,11 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
 
 
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
-    files = [Path(lcd.model) if lcd.model else model_path(f'target_{target}.json')
+    files = [target_path(lcd.model, target)
              for target in dict.fromkeys((cell.target, cell.asked_target))]
     if cell.attack.mode == 'surrogate':
         chosen = cell.attack.surrogate_data
-        files.append(Path(chosen) if chosen else model_path('surrogate_data.npz'))
+        files.append(Path(chosen) if chosen else model_path(SURROGATE_DATA))
     return files
 
 

@@ -25,7 +25,9 @@ from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_str
 from adversarial_lcd_ros.evaluation.sweep.cell_store import CellStore
 from adversarial_lcd_ros.evaluation.sweep.cells import Cell, cell_key, make_row
 from adversarial_lcd_ros.evaluation.sweep.frames import FrameSample, attack_frames, sample_frames
+from adversarial_lcd_ros.evaluation.training.model_folder import trained_on
 from adversarial_lcd_ros.evaluation.workers import Run
+from adversarial_lcd_ros.paths import target_path
 
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
@@ -208,6 +210,8 @@ def run_task(task: Task) -> tuple[list[tuple[str, Row]], float]:
         graphs = load_stream_graphs(task.graphs)
         found = attack_frames(graphs, task.sample, task.cells, task.lcd, task.seed)
     rows = [(key, {**make_row(cell, task.seed, task.sequence, results),
+                   'trained_on': trained_on(target_path(task.lcd.model, cell.target),
+                                            task.graphs.source),
                    'versions': versions_digest()})
             for key, cell, results in zip(task.keys, task.cells, found, strict=True)]
     return rows, task.cost_s

@@ -29,11 +29,11 @@ from adversarial_lcd_ros.evaluation.offline import run_offline
 from adversarial_lcd_ros.evaluation.pairs import sample_pairs
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.sweep.cells import digest_of, file_digest
-from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
+from adversarial_lcd_ros.evaluation.training.model_folder import trained_on
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets import Target, make_target
 from adversarial_lcd_ros.lcd.training import LabelledPairs, PairScorer
-from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.paths import target_path
 
 SCHEMA = 2
 PROTOCOLS = ('pairs', 'live')
@@ -79,7 +79,7 @@ class TargetTask:
         values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
                   'models': [file_digest(path) for path in
-                             (self._model, self._model.with_suffix('.onnx')) if path.exists()],
+                             (self.model, self.model.with_suffix('.onnx')) if path.exists()],
                   'seeds': self.seeds,
                   'scored': self.scored, 'labels': asdict(self.label_config)}
         if self.protocol == 'pairs':
@@ -89,17 +89,18 @@ class TargetTask:
         return digest_of(json.dumps(values, sort_keys=True).encode())
 
     @property
-    def _model(self) -> Path:
-        return Path(self.lcd.model) if self.lcd.model else model_path(f'target_{self.target}.json')
+    def model(self) -> Path:
+        """File of the trained decision."""
+        return target_path(self.lcd.model, self.target)
 
     def decision(self) -> Decision:
         """Return the trained decision of the target."""
         target = self.make_target()
-        return Decision.load(self._model, target.name, target.channels)
+        return Decision.load(self.model, target.name, target.channels)
 
     def make_target(self) -> Target:
         """Return the target; one with a network takes that beside its decision."""
-        return make_target(self.target, self._model.with_suffix('.onnx'))
+        return make_target(self.target, self.model.with_suffix('.onnx'))
 
     def labels(self) -> FrameLabels:
         """Return the labels, without queries outside the part that is scored."""
@@ -130,21 +131,11 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
         'sequence': stream.name, 'target': task.target, 'protocol': task.protocol,
         'nodes': stream.nodes, 'nodes_mean': stream.nodes_mean,
         'frames': len(stream.labels.kind), 'scored': list(task.scored),
-        'trained_on': trained_on(stream.graphs.source, task.scored),
-        'references_trained_on': trained_on(stream.graphs.source, (0.0, task.scored[1])),
+        'trained_on': trained_on(task.model, stream.graphs.source, task.scored),
+        'references_trained_on': trained_on(task.model, stream.graphs.source,
+                                            (0.0, task.scored[1])),
         'geometric_check': task.protocol == 'live' and task.lcd.geometric_check,
         'labels': asdict(task.label_config), **figures}
-
-
-def trained_on(source: str, scored: tuple[float, float] = (0.0, 1.0)) -> bool:
-    """Tell by their card whether the models that ship were trained on scored frames."""
-    part = TrainingSource.parse(source)
-    length = part.stop - part.start
-    start, stop = (part.start + length * end for end in scored)
-    card = json.loads(model_path('MODEL_CARD.json').read_text(encoding='utf-8'))
-    name = part.path.resolve().stem
-    return any(entry['name'] == name and entry['part'][0] < stop
-               and start < entry['part'][1] for entry in card['sequences'])
 
 
 def _pairs(task: TargetTask) -> Row:

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import hashlib
+import json
 from pathlib import Path
 import tempfile
 from typing import Any
 
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
+from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 
-VOCABULARY, SURROGATE_DATA, MODEL_CARD = 'vocabulary.npz', 'surrogate_data.npz', 'MODEL_CARD.json'
+MODEL_CARD = 'MODEL_CARD.json'
 _TARGET, _NETWORK = 'target_{}.json', 'target_{}.onnx'
 _OURS = (VOCABULARY, SURROGATE_DATA, MODEL_CARD, _TARGET.format('*'), _NETWORK.format('*'))
 
@@ -85,3 +88,36 @@ def file_digests(folder: Path) -> dict[str, dict[str, Any]]:
     return {file.name: {'bytes': file.stat().st_size,
                         'sha256': hashlib.sha256(file.read_bytes()).hexdigest()}
             for file in sorted(folder.iterdir())}
+
+
+def trained_on(decision: Path, source: str,
+               scored: tuple[float, float] = (0.0, 1.0)) -> bool | None:
+    """
+    Tell whether a decision was trained on frames of a sequence.
+
+    Parameters
+    ----------
+    decision : Path
+        File beside which its card is.
+    source : str
+        ``PATH`` or ``PATH@FROM:TO``; sequences are told by the name of their folder.
+    scored : (float, float)
+        From and to which fraction of that part.
+
+    Returns
+    -------
+    bool or None
+        None if there is no card to tell.
+
+    """
+    try:
+        text = (decision.parent / MODEL_CARD).read_text(encoding='utf-8')
+        sequences = [(entry['name'], *entry['part']) for entry in json.loads(text)['sequences']]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    part = TrainingSource.parse(source)
+    length = part.stop - part.start
+    begin, end = (part.start + length * fraction for fraction in scored)
+    name = part.path.resolve().stem
+    return any(trained == name and start < end and begin < stop
+               for trained, start, stop in sequences)

@@ -27,8 +27,6 @@ from adversarial_lcd_ros.evaluation.training.decisions import (
 from adversarial_lcd_ros.evaluation.training.gnn import require_pytorch
 from adversarial_lcd_ros.evaluation.training.model_folder import (
     MODEL_CARD,
-    SURROGATE_DATA,
-    VOCABULARY,
     decision_file,
     file_digests,
     model_folder,
@@ -42,6 +40,7 @@ from adversarial_lcd_ros.evaluation.training.sources import (
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.lcd.training import Progress
+from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 from adversarial_lcd_ros.vision.features import FeatureExtractor, to_grey
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
