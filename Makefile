@@ -39,7 +39,7 @@ paper: model $(PAPER_MODELS)/MODEL_CARD.json
 	  --models $(PAPER_MODELS) --output results/paper $(ARGS)
 
 $(PAPER_MODELS)/MODEL_CARD.json: | model
-	$(BIN)/adversarial-lcd train $(TRAIN:%=$(DATA)/%) --targets wl anchored objects --output $(@D)
+	$(BIN)/adversarial-lcd train $(TRAIN:%=$(DATA)/%) --output $(@D)
 
 target: model
 	$(BIN)/adversarial-lcd targets --recipe target --data $(DATA) --output results/target $(ARGS)

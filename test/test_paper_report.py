@@ -16,6 +16,7 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.paper import figures, views, words
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import latex_escape, latex_table
+from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
 from adversarial_lcd_ros.evaluation.paper.statistics import summarise_cells, summarise_methods
@@ -91,7 +92,8 @@ def test_exports_hold_the_same_figures(whole):
     assert float(table[0]['ci95_low']) == summary[0]['ci95'][0]
     assert 'frame_results' not in cells[0]
     assert sorted(path.name for path in folder.iterdir()) == [
-        'cells.csv', 'report.html', 'summary.csv', 'summary.json', 'tables.tex']
+        'cells.csv', 'report.html', 'summary.csv', 'summary.json', 'tables.md',
+        'tables.tex']
 
 
 def test_order_of_rows_does_not_matter(tmp_path):
@@ -131,6 +133,32 @@ def test_pictures_of_the_folder_are_shown(tmp_path):
     assert 'left no pictures' not in text
 
 
+def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
+    rows = [make_row(sequence, target=target, perturbation=name, surrogate=surrogate, seed=seed,
+                     frames=100, power=power, nodes=50 if sequence == SEQUENCES[2] else 300)
+            for sequence in SEQUENCES[:3] for target in ('anchored', 'wl') for seed in (0, 1)
+            for name, surrogate, power in (('recall', 'none', 0.4), ('optimum', 'none', 0.8),
+                                           ('eigencentrality', 'svm_rbf', 0.1))]
+    for row in rows:
+        row['nodes'] = 300
+    cells = summarise_cells(rows)
+    text = markdown_tables(cells, summarise_methods(cells), 3e-4)
+    about, _, *lines = text.splitlines()
+    assert 'r = 0.0003, 300 features' in about
+    assert lines[0] == ('| `wl` | frames | edits | queries | synthetic_kitchen | synthetic_tour | '
+                        'mean | of the optimum |')
+    assert [line.split(' | ')[0] for line in lines[2:6]] == [
+        '| before', '| recall, query-guided', '| eigencentrality + SVM-RBF, query-guided',
+        '| optimum (yardstick)']
+    recall = next(cell for cell in cells if cell['sequence'] == SEQUENCES[0]
+                  and (cell['target'], cell['perturbation']) == ('wl', 'recall'))
+    fields = lines[3].split(' | ')
+    assert fields[1] == '200'
+    assert fields[5].startswith(f'{recall["decline_pp"]:.1f} (')
+    assert lines[7].endswith('allows an edit: synthetic_desk.')
+    assert lines[9].startswith('| `anchored` |')
+
+
 def test_headline_is_of_the_black_box_attack():
     rows = [make_row(sequence, perturbation=name, surrogate='none', power=power, frames=200)
             for sequence in SEQUENCES for name, power in (('recall', 0.4), ('optimum', 0.8))]
@@ -138,6 +166,15 @@ def test_headline_is_of_the_black_box_attack():
     assert 'strongest black-box attack on target wl (recall, query-guided, 300 features)' in text
     assert 'over 4 sequences' in text
     assert 'of what the greedy optimum' in text
+
+
+def test_headline_is_of_the_usual_size_of_graph():
+    rows = [make_row(sequence, perturbation=name, surrogate=surrogate, power=power, nodes=nodes)
+            for sequence in SEQUENCES[:2]
+            for name, surrogate, power, nodes in (
+                ('recall', 'none', 0.3, 300), ('eigencentrality', 'svm_rbf', 0.1, 300),
+                ('recall', 'none', 0.9, 1000))]
+    assert '(recall, query-guided, 300 features)' in words_of(rows)
 
 
 def test_headline_says_when_there_is_nothing():

@@ -1,5 +1,5 @@
 """
-The report on the paper's experiments: report.html, and the same figures as CSV, JSON and LaTeX.
+The report on the paper's experiments: report.html, and its figures as CSV, JSON, LaTeX, Markdown.
 
 One file that holds all it shows, opens offline and on a phone; made from the rows of the
 cells, so it can be written anew at any time, also while cells are missing.
@@ -7,7 +7,6 @@ cells, so it can be written anew at any time, also while cells are missing.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,26 +17,24 @@ from adversarial_lcd_ros.evaluation import plots, statistics, wording
 from adversarial_lcd_ros.evaluation.paper import figures, views, words
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import write_exports, write_text
+from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.statistics import (
-    OPTIMUM,
     Cell,
     Row,
     summarise_cells,
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import PRINTED_TABLES, misprints
+from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
 from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.report import data_uri, load_template
 from adversarial_lcd_ros.evaluation.results import REPORT
 
+TABLES_MD = 'tables.md'
 _PICTURES = 6
 _BESIDE = 6.4  # inches
 _MANY_COLUMNS = 6
-# Settings that are named only where they are not the usual ones.
-_WORDS = {'nodes': '{} features', 'oracle': '{} answers',
-          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}', 'variant': '{}'}
-
 Plot = dict[str, str]
 
 
@@ -66,6 +63,8 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
     tables = [views.surrogate_tables(cells), views.perturbation_tables(cells),
               views.budget_tables(cells)]
     write_exports(folder, rows, cells, [table for group in tables for table in group])
+    write_text(folder / TABLES_MD, markdown_tables(cells, summarise_methods(cells),
+                                                   views.main_ratio(cells)))
     pictures = [(title, caption, data_uri(data, 'jpeg'))
                 for title, caption, data in read_pictures(folder)[:_PICTURES]]
     path = folder / REPORT
@@ -78,7 +77,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Cell],
             tables: Sequence[list[DeclineTable]]) -> dict[str, Any]:
     ratio = views.main_ratio(cells)
     methods = summarise_methods(cells)
-    usual = _usual(cells)
+    usual = usual_settings(cells)
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
@@ -87,8 +86,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Cell],
         'warnings': words.warnings(cells, tables[0] + tables[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
-        'usual': ', '.join(words.format(usual[name]) for name, words in _WORDS.items()
-                           if usual[name] != ''),
+        'usual': usual_title(usual),
         'verdicts': [(name, words.verdict(group[0])) for name, group in zip(
             ('Surrogates', 'Perturbations'), tables, strict=False) if group],
         'surrogates': _blocks(tables[0]), 'perturbations': _blocks(tables[1]),
@@ -185,32 +183,19 @@ def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, s
         there = [method for method in left if method['target'] == target]
         left = [method for method in left if method['target'] != target]
         rows[str(target)] = [
-            {'attack': _full_title(method, usual), 'N': str(len(method['sequences'])),
+            {'attack': full_title(method, usual), 'N': str(len(method['sequences'])),
              **_figures(method), **_counts(method)}
             for method in sorted(there, key=lambda method: (-method['decline_pp'],
-                                                            _full_title(method, usual)))]
+                                                            full_title(method, usual)))]
     return rows
-
-
-def _usual(cells: Sequence[Cell]) -> dict[str, Any]:
-    # The commonest value of each setting; of equally common ones the largest.
-    counts = {name: Counter(cell[name] for cell in cells) for name in _WORDS}
-    return {name: max(count, key=lambda value: (count[value], value))
-            for name, count in counts.items()}
-
-
-def _full_title(summary: Cell, usual: Cell) -> str:
-    return ', '.join([_title(summary), *(
-        words.format(summary[name]) for name, words in _WORDS.items()
-        if summary[name] not in (usual[name], ''))])
 
 
 def _cells(cells: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, str]]]:
     rows: dict[str, list[dict[str, str]]] = {}
     for cell in sorted(cells, key=lambda cell: (
-            cell['target'], -(cell['decline_pp'] or 0.0), _full_title(cell, usual))):
+            cell['target'], -(cell['decline_pp'] or 0.0), full_title(cell, usual))):
         rows.setdefault(cell['sequence'], []).append(
-            {'target and attack': f'{cell["target"]}: {_full_title(cell, usual)}',
+            {'target and attack': f'{cell["target"]}: {full_title(cell, usual)}',
              **_figures(cell), **_counts(cell)})
     return {sequence: rows[sequence] for sequence in sorted(rows)}
 
@@ -234,14 +219,6 @@ def _counts(summary: Cell) -> dict[str, str]:
 def _count(value: float) -> str:
     # A mean of counts: without decimals where it is a whole number, as with a single seed.
     return f'{value:,.0f}' if value == round(value) else wording.mean_count(value)
-
-
-def _title(summary: Cell) -> str:
-    title = wording.attack_title({**summary, 'name': None})
-    if summary['perturbation'] == OPTIMUM:
-        return 'optimum (yardstick)'
-    asked = summary['asked_target']
-    return title if asked == summary['target'] else f'{title}, asked {asked}'
 
 
 def _duration(seconds: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -21,6 +22,9 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
     """
     Return the black-box attack with the largest mean decline; None without any.
 
+    Of the size of graph that most attacks have: others are experiments of their own, often on few
+    frames.
+
     Parameters
     ----------
     methods : sequence of dict
@@ -33,6 +37,8 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
     there = [method for method in methods
              if method['perturbation'] != OPTIMUM and method['asked_target'] == method['target']
              and method['mode'] != 'pass' and target in (None, method['target'])]
+    sizes = Counter(method['nodes'] for method in there).most_common(1)
+    there = [method for method in there if method['nodes'] == sizes[0][0]]
     return max(there, key=lambda method: method['decline_pp'], default=None)
 
 

@@ -1,0 +1,90 @@
+"""Attacks by sequence as Markdown tables, one for each target: for a README."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from adversarial_lcd_ros.config import TARGETS
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.paper.statistics import (
+    ATTACK,
+    OPTIMUM,
+    Cell,
+    is_attackable,
+)
+from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
+
+_NONE = '-'
+
+
+def markdown_tables(cells: Sequence[Cell], methods: Sequence[Cell], ratio: float) -> str:
+    """
+    Return the declines at a perturbation ratio.
+
+    Parameters
+    ----------
+    cells, methods : sequence of dict
+        From ``summarise_cells`` and ``summarise_methods``.
+    ratio : float
+        r.
+
+    """
+    cells = [cell for cell in cells if cell['ratio'] == ratio]
+    usual = usual_settings(cells)
+    there = {cell['target'] for cell in cells}
+    targets = [name for name in TARGETS if name in there]
+    return '\n'.join([
+        f'Decline in balanced accuracy, points, with 95 % intervals over blocks of time; r = '
+        f'{ratio:g}, {usual_title(usual)}, unless said otherwise.\n',
+        *(_target(target, [cell for cell in cells if cell['target'] == target],
+                  [method for method in methods
+                   if method['target'] == target and method['ratio'] == ratio], usual)
+          for target in targets)])
+
+
+def _target(target: str, cells: Sequence[Cell], methods: Sequence[Cell], usual: Cell) -> str:
+    every = sorted({cell['sequence'] for cell in cells})
+    sequences = sorted({cell['sequence'] for cell in cells if is_attackable(cell)}) or every
+    before = {cell['sequence']: cell['balanced_clean'] for cell in cells
+              if cell['nodes'] == usual['nodes']}
+    at = {(*(cell[name] for name in ATTACK), cell['sequence']): cell for cell in cells}
+    head = [f'`{target}`', 'frames', 'edits', 'queries', *sequences, 'mean', 'of the optimum']
+    lines = [_line(head), _line('---' for _ in head),
+             _line(['before', '', '', '', *(wording.percent(before.get(name))
+                                            for name in sequences), '', ''])]
+    for method in sorted(methods, key=lambda method: (
+            method['perturbation'] == OPTIMUM, -method['decline_pp'])):
+        key = tuple(method[name] for name in ATTACK)
+        entries = [at.get((*key, name)) for name in sequences]
+        share = method['share_of_optimum']
+        lines.append(_line([
+            full_title(method, usual), _sample(entries), _count(method['edits_mean']),
+            _count(method['queries_mean']), *map(_decline, entries),
+            f'**{wording.points(method["decline_pp"])}**',
+            _NONE if share is None else wording.percent(share, 0)]))
+    left_out = ', '.join(name for name in every if name not in sequences)
+    if left_out:
+        lines += ['', f'Without a figure, or without a graph that allows an edit: {left_out}.']
+    return '\n'.join(lines) + '\n'
+
+
+def _line(texts: Iterable[str]) -> str:
+    return f'| {" | ".join(texts)} |'
+
+
+def _sample(entries: Sequence[Cell | None]) -> str:
+    """Return over how many frames a sequence has been attacked, repeats included."""
+    counts = sorted({round(cell['frames'] * cell['seeds']) for cell in entries if cell})
+    return ' to '.join(f'{count}' for count in dict.fromkeys([counts[0], counts[-1]]))
+
+
+def _count(value: float | None) -> str:
+    return _NONE if value is None else f'{value:,.0f}'
+
+
+def _decline(cell: Cell | None) -> str:
+    if cell is None or not is_attackable(cell):
+        return _NONE
+    bounds = cell['ci95']
+    interval = f' ({wording.interval(bounds)})' if bounds else ''
+    return f'{wording.points(cell["decline_pp"])}{interval}'

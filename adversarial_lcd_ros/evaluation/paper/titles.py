@@ -1,0 +1,41 @@
+"""What attacks are called beside each other: settings are named where they are not the usual."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell
+
+_WORDS = {'nodes': '{} features', 'oracle': '{} answers',
+          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}', 'variant': '{}'}
+
+
+def usual_settings(cells: Sequence[Cell]) -> dict[str, Any]:
+    """Return the commonest value of each setting; of equally common ones the largest."""
+    counts = {name: Counter(cell[name] for cell in cells) for name in _WORDS}
+    return {name: max(count, key=lambda value: (count[value], value))
+            for name, count in counts.items()}
+
+
+def usual_title(usual: Cell) -> str:
+    """Return the usual settings in words."""
+    return ', '.join(words.format(usual[name]) for name, words in _WORDS.items()
+                     if usual[name] != '')
+
+
+def full_title(summary: Cell, usual: Cell) -> str:
+    """Return what an attack is called; settings that are not the usual ones are named."""
+    return ', '.join([_title(summary), *(
+        words.format(summary[name]) for name, words in _WORDS.items()
+        if summary[name] not in (usual[name], ''))])
+
+
+def _title(summary: Cell) -> str:
+    title = wording.attack_title({**summary, 'name': None})
+    if summary['perturbation'] == OPTIMUM:
+        return 'optimum (yardstick)'
+    asked = summary['asked_target']
+    return title if asked == summary['target'] else f'{title}, asked {asked}'
