@@ -187,6 +187,9 @@ def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, s
              **_figures(method), **_counts(method)}
             for method in sorted(there, key=lambda method: (-method['decline_pp'],
                                                             full_title(method, usual)))]
+    if not any(method['unattackable'] for method in methods):
+        for row in (row for group in rows.values() for row in group):
+            del row['unattackable']
     return rows
 
 

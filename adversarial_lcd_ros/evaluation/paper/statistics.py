@@ -10,7 +10,7 @@ only seen by comparing sequences (``summarise_methods``, ``paper_ranks``).
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 import math
 from typing import Any
@@ -58,6 +58,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
         ``CELL``; means over the seeds of the figures; and
 
         * ``trained_on``: the detector was trained on frames of the sequence; None if unknown
+        * ``different_positives``, ``different_negatives``: frames of a kind, repeats once
         * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
         * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
@@ -176,7 +177,7 @@ def _summarise(rows: Sequence[Row]) -> Cell:
     positive, negative = _right_before(rows)
     cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
     cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
-                trained_on=rows[0].get('trained_on'),
+                trained_on=rows[0].get('trained_on'), **_different_frames(rows),
                 decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
                 ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
                 duration_s=math.fsum(row['duration_s'] for row in rows))
@@ -192,6 +193,13 @@ def _right_before(rows: Sequence[Row]) -> tuple[float, float]:
     counts = [[int((frame_right(row, 'clean') & (_kinds(row) == kind)).sum()) for row in rows]
               for kind in (POSITIVE, NEGATIVE)]
     return float(np.mean(counts[0])), float(np.mean(counts[1]))
+
+
+def _different_frames(rows: Sequence[Row]) -> dict[str, int]:
+    kinds = {frame['stamp']: kind for row in rows
+             for frame, kind in zip(row['frame_results'], _kinds(row), strict=True)}
+    counts = Counter(kinds.values())
+    return {'different_positives': counts[POSITIVE], 'different_negatives': counts[NEGATIVE]}
 
 
 def _kinds(row: Row) -> NDArray[np.int8]:

@@ -15,6 +15,7 @@ from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 
 PAPER_SEEDS = 10
 _FEW_FRAMES = 30
+_MANY_TABLES = 3
 _TIE_PP = 0.05  # what is printed as equal is equal
 
 
@@ -186,15 +187,20 @@ def _separation(tables: Sequence[DeclineTable]) -> list[str]:
 
 
 def _incomplete(tables: Sequence[DeclineTable]) -> list[str]:
-    texts = []
+    where: dict[str, list[str]] = {}
     for table in tables:
-        lost = [line.title for line in table.lines
-                if any(entry is None or not is_attackable(entry) for entry in line.entries)]
-        if lost and table.mean is not None:
-            texts.append(f'Table {table.printed.number} ({table.title}): {", ".join(lost)} '
-                         'without a figure, or without a frame that allows an edit, in some '
-                         'column; not in the mean and the ranks.')
-    return texts
+        for line in table.lines:
+            if table.mean is not None and any(
+                    entry is None or not is_attackable(entry) for entry in line.entries):
+                where.setdefault(line.title, []).append(
+                    f'table {table.printed.number} ({table.title})')
+    return [f'{sequence} is not in the mean and the ranks of {_listed(tables)}: for want of a '
+            'figure, or of a frame that allows an edit, in some column.'
+            for sequence, tables in where.items()]
+
+
+def _listed(tables: Sequence[str]) -> str:
+    return ', '.join(tables) if len(tables) < _MANY_TABLES else f'{len(tables)} tables'
 
 
 def _trained(cells: Sequence[Cell]) -> list[str]:
@@ -209,13 +215,14 @@ def _frames(cells: Sequence[Cell]) -> list[str]:
     texts = []
     for sequence in sorted({cell['sequence'] for cell in cells}):
         of_sequence = [cell for cell in cells if cell['sequence'] == sequence]
-        positives = min(cell['positives'] for cell in of_sequence)
-        negatives = min(cell['negatives'] for cell in of_sequence)
+        positives, negatives = (max(cell[f'different_{kind}'] for cell in of_sequence)
+                                for kind in ('positives', 'negatives'))
         if not positives or not negatives:
             kind = 'loops' if not positives else 'new places'
             texts.append(f'{sequence} has no {kind}: no balanced accuracy, no decline.')
         elif min(positives, negatives) < _FEW_FRAMES:
-            texts.append(f'{sequence} has {positives:g} frames with a loop and {negatives:g} at '
-                         f'a new place: with fewer than {_FEW_FRAMES} of one kind its interval is '
-                         'wide, or too narrow if they lie in a few blocks of time.')
+            texts.append(f'{sequence}: {positives} different frames with a loop and {negatives} '
+                         f'at a new place were attacked at most; with fewer than {_FEW_FRAMES} of '
+                         'one kind its interval is wide, or too narrow if they lie in a few '
+                         'blocks of time.')
     return texts
