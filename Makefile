@@ -11,8 +11,8 @@ ARGS ?=
 DATA ?= ../shared/data
 PAPER ?= flat_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy \
   rgbd_dataset_freiburg3_long_office_household
+MODELS ?= adversarial_lcd_ros/models
 TRAIN ?= flat_train
-PAPER_MODELS ?= results/paper_models
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
@@ -29,16 +29,17 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 demo: model
 	$(BIN)/adversarial-lcd demo $(ARGS)
 
-# The models that ship have seen half of freiburg1_rpy; here detectors have seen TRAIN and nothing
-# else. PAPER_MODELS=adversarial_lcd_ros/models takes those that ship.
-paper: model $(PAPER_MODELS)/MODEL_CARD.json
+# The models that ship have seen half of freiburg1_rpy, and the report says so. With another folder
+# as MODELS detectors are trained there first, on TRAIN alone:
+#   make paper MODELS=results/flat_train_models ARGS='--output results/paper_flat_train'
+paper: model $(MODELS)/MODEL_CARD.json
 	@for sequence in $(PAPER); do test -e "$(DATA)/$${sequence%@*}" || { echo \
 	  "error: there is no $(DATA)/$${sequence%@*}; make paper DATA=FOLDER, or PAPER='NAME ...' for others" \
 	  >&2; exit 1; }; done
 	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper \
-	  --models $(PAPER_MODELS) --output results/paper $(ARGS)
+	  --models $(MODELS) --output results/paper $(ARGS)
 
-$(PAPER_MODELS)/MODEL_CARD.json: | model
+$(MODELS)/MODEL_CARD.json: | model
 	$(BIN)/adversarial-lcd train $(TRAIN:%=$(DATA)/%) --output $(@D)
 
 target: model
