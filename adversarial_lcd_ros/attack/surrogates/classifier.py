@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
 
 from adversarial_lcd_ros.attack.surrogates.kernel import Kernel
+from adversarial_lcd_ros.attack.surrogates.scaling import standardise
 
 MIN_ROWS = 10
 
@@ -32,14 +33,14 @@ class Classifier(ABC):
         if len(label) < MIN_ROWS or label.all() or not label.any():
             return False
         self._scaler = StandardScaler().fit(features)
-        scaled = self._scaler.transform(features)
+        scaled = standardise(self._scaler, features)
         self._model = self._make(scaled)
         self._model.fit(scaled, label)
         return True
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a score that grows with the certainty of a gain, shape (k,)."""
-        return self._score(self._scaler.transform(features))
+        return self._score(standardise(self._scaler, features))
 
     @abstractmethod
     def _make(self, scaled: NDArray[np.float64]) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
 
 from adversarial_lcd_ros.attack.surrogates.kernel import Kernel
+from adversarial_lcd_ros.attack.surrogates.scaling import standardise
 
 MIN_ROWS = 10
 
@@ -30,14 +31,14 @@ class Regressor(ABC):
         if len(gain) < MIN_ROWS or np.ptp(gain) == 0:
             return False
         self._scaler = StandardScaler().fit(features)
-        scaled = self._scaler.transform(features)
+        scaled = standardise(self._scaler, features)
         self._model = self._make(scaled)
         self._model.fit(scaled, (gain - gain.mean()) / gain.std())
         return True
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the gain in standard deviations from that of the training rows, shape (k,)."""
-        gain: NDArray[np.float64] = self._model.predict(self._scaler.transform(features))
+        gain: NDArray[np.float64] = self._model.predict(standardise(self._scaler, features))
         return gain
 
     @abstractmethod
