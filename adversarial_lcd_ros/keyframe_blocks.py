@@ -115,15 +115,15 @@ class Query:
         folded = _folded(number, weight)
         column = np.flatnonzero(folded)
         level = np.ceil(folded[column] / UNIT)
-        # What a weight has beyond the top level may all be in common.
-        self.excess = float((np.maximum(folded[column] - TOP_LEVEL * UNIT, 0)).sum())
+        self.excess = _excess(folded)
         padding = -len(column) % 4
         self.column = np.append(column, np.zeros(padding, np.int64))
         self.level = np.append(np.minimum(level, TOP_LEVEL), np.zeros(padding)).astype(np.uint8)
 
-    def least_level(self, score: float) -> int:
-        """Return which sum of levels, at least, a keyframe of a score has."""
-        return max(1, math.ceil((score * _ROUNDING - self.excess) / UNIT) - 1)
+
+def least_level(score: float) -> int:
+    """Return which sum of levels, at least, a keyframe of a score has."""
+    return max(1, math.ceil(score * _ROUNDING / UNIT) - 1)
 
 
 def _folded(number: NDArray[np.int64], weight: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -132,17 +132,23 @@ def _folded(number: NDArray[np.int64], weight: NDArray[np.float32]) -> NDArray[n
     return np.asarray(folded, np.float64)
 
 
+def _excess(folded: NDArray[np.float64]) -> int:
+    """Return what columns weigh beyond the top level, in units, rounded up."""
+    return math.ceil(float(np.maximum(folded - TOP_LEVEL * UNIT, 0).sum()) / UNIT)
+
+
 class Block:
     """
     Up to 4096 keyframes: levels of their words' weights in columns, and the weights themselves.
 
-    A level is a weight in units of 2^-13, rounded up, at most 63. More words than columns share
-    columns: their weights add up, and bounds stay bounds. 4 kB of levels and 8 bytes a word for
-    each keyframe.
+    A level is a weight in units of 2^-13, rounded up, at most 63; what a frame of few words
+    weighs beyond is kept as a sum. More words than columns share columns: their weights add up,
+    and bounds stay bounds. 4 kB of levels and 8 bytes a word for each keyframe.
     """
 
     def __init__(self) -> None:
         self._cells: NDArray[np.uint8] = np.zeros((COLUMNS, KEYFRAMES), np.uint8)
+        self._excess: NDArray[np.uint32] = np.zeros(KEYFRAMES, np.uint32)
         self._start: NDArray[np.int64] = np.zeros(KEYFRAMES + 1, np.int64)
         self._number: NDArray[np.uint32] = np.zeros(1 << 14, np.uint32)
         self._weight: NDArray[np.float32] = np.zeros(1 << 14, np.float32)
@@ -151,8 +157,8 @@ class Block:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        return (self._cells.nbytes + self._start.nbytes + self._number.nbytes
-                + self._weight.nbytes)
+        return sum(array.nbytes for array in (self._cells, self._excess, self._start,
+                                              self._number, self._weight))
 
     def add(self, number: NDArray[np.int64], weight: NDArray[np.float32]) -> None:
         """Store the next keyframe's word numbers, without repeats, and their weights."""
@@ -165,6 +171,7 @@ class Block:
         folded = _folded(number, weight)
         column = np.flatnonzero(folded)
         self._cells[column, self.count] = np.minimum(np.ceil(folded[column] / UNIT), TOP_LEVEL)
+        self._excess[self.count] = _excess(folded)
         self.count += 1
         self._start[self.count] = end
 
@@ -173,6 +180,16 @@ class Block:
         levels: NDArray[np.uint32] = _level_sums(self._cells, query.column, query.level,
                                                  self.count)
         return levels
+
+    def beyond(self, query: Query) -> NDArray[np.uint32]:
+        """
+        Return how many levels more a score may have than its sum, shape (count,).
+
+        Weights beyond the top level have no more in common than the smaller sum of the two
+        frames.
+        """
+        more: NDArray[np.uint32] = np.minimum(self._excess[:self.count], np.uint32(query.excess))
+        return more
 
     def scores(self, query: Query, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the DBoW L1 scores of chosen keyframes of the block, shape (k,)."""

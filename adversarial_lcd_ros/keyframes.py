@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.keyframe_blocks import KEYFRAMES, Block, Query, common_weight
+from adversarial_lcd_ros.keyframe_blocks import KEYFRAMES, Block, Query, common_weight, least_level
 
 # Scored at once, the best bounds first.
 LEAST_SCORED = 64
@@ -110,6 +110,14 @@ class Database:
         return np.concatenate([np.zeros(0, np.uint32),
                                *run(lambda block: block.levels(query), self._blocks)])
 
+    def _bounds(self, query: Query, level: NDArray[np.uint32]) -> NDArray[np.uint32]:
+        """Return what sums of levels bound scores, 0 where they are 0."""
+        if not query.excess:
+            return level.copy()
+        beyond = np.concatenate([np.zeros(0, np.uint32),
+                                 *(block.beyond(query) for block in self._blocks)])
+        return np.where(level > 0, level + beyond, level)
+
     def retrieve(self, graph: MultiTierGraph, admissible: NDArray[np.bool_], count: int,
                  window: int = 0) -> tuple[list[int], list[float]]:
         """
@@ -130,15 +138,17 @@ class Database:
         level = self._levels(query)
         level[~admissible] = 0
         unlike = np.flatnonzero(admissible & (level == 0))
+        bound = self._bounds(query, level)
         ranked, score, chosen = np.zeros(0, np.int64), np.zeros(0), list[int]()
         # Each one chosen rules out 2 window others: among so many are enough.
-        cut = _largest(level, max(LEAST_SCORED, count * (2 * window + 1)))
-        while len(new := np.flatnonzero(level >= cut)):
-            level[new] = 0
+        new = np.flatnonzero(level >= _largest(level, max(LEAST_SCORED, count * (2 * window + 1))))
+        while len(new):
+            bound[new] = 0
             ranked, score = np.append(ranked, new), np.append(score, self._scores(query, new))
             ranked, score = _by_score(ranked, score)
             chosen = _spread(ranked, count, window)
-            cut = query.least_level(score[chosen[-1]]) if len(chosen) == count else 1
+            new = np.flatnonzero(bound >= (least_level(score[chosen[-1]])
+                                           if len(chosen) == count else 1))
         # Levels in common may be those of two words in one column: a score can be 0 there, too.
         if len(chosen) < count or score[chosen[-1]] == 0:
             ranked, score = _by_score(np.append(ranked, unlike),
