@@ -159,8 +159,9 @@ def _sequences(cells: Sequence[Cell]) -> list[dict[str, str]]:
     for sequence in sorted({cell['sequence'] for cell in cells}):
         there = [cell for cell in cells if cell['sequence'] == sequence]
         rows.append({'sequence': sequence,
-                     'frames': _range(there, 'frames'), 'with a loop': _range(there, 'positives'),
-                     'at a new place': _range(there, 'negatives'),
+                     'frames a seed': _range(there, 'frames'),
+                     'different loops': _range(there, 'different_positives'),
+                     'different new places': _range(there, 'different_negatives'),
                      'nodes': _range(there, 'nodes_mean'), 'edges': _range(there, 'edges_mean'),
                      'seeds': _range(there, 'seeds'), 'attacks': str(len(there)),
                      'time': _duration(sum(cell['duration_s'] for cell in there))})
