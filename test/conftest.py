@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 from pathlib import Path
+import signal
 
 from hypothesis import settings
 import pytest
@@ -9,6 +10,9 @@ from ros_fixtures import lcd_model, ros, vocabulary  # noqa: F401
 # The first call of a compiled function compiles it, whichever example that is.
 settings.register_profile('compiling', deadline=None)
 settings.load_profile('compiling')
+
+# A shell that runs the tests in the background has Ctrl-C ignored, and some tests press it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / 'shared' / 'data'
 
