@@ -38,7 +38,8 @@ def make_row(sequence='synthetic_tour', target='wl', perturbation='eigencentrali
     return {
         'sequence': sequence, 'target': target, 'perturbation': perturbation,
         'surrogate': surrogate, 'oracle': oracle, 'mode': mode, 'ratio': ratio, 'edits': 'both',
-        'queries_per_edit': 40, 'nodes': nodes, 'variant': '', 'nodes_mean': nodes + 4.5,
+        'queries_per_edit': 40, 'nodes': nodes, 'threshold': 0.5, 'variant': '',
+        'nodes_mean': nodes + 4.5,
         'edges_mean': 3.1 * nodes, 'seed': seed, 'frames': frames,
         'positives': int((kind > 0).sum()), 'negatives': int((kind < 0).sum()),
         'accuracy_clean': float(right(before).mean()),

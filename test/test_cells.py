@@ -24,7 +24,7 @@ CELL = Cell('eigencentrality', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 @pytest.mark.parametrize('changed', [
     {'perturbation': 'optimum'}, {'attack': AttackConfig(ratio=1e-4)},
     {'attack': AttackConfig(gamma='scale')}, {'target': 'edges'}, {'asked_target': 'edges'},
-    {'oracle': 'hard'}, {'nodes': 100}, {'frames': 5}])
+    {'oracle': 'hard'}, {'nodes': 100}, {'frames': 5}, {'threshold': 0.9}])
 def test_a_key_depends_on_every_setting(changed):
     assert cell_key(replace(CELL, **changed), 42, 'a', LcdConfig()) != (
         cell_key(CELL, 42, 'a', LcdConfig()))
@@ -45,8 +45,8 @@ def test_a_key_depends_on_seed_sequence_detector_code_and_models(tmp_path, monke
 
 def test_a_key_depends_on_nothing_else():
     same = replace(CELL, name='a name', seeds=3, attack=AttackConfig(seed=1))
-    assert cell_key(same, 42, 'a', LcdConfig(target='edges', hard_answers=True)) == (
-        cell_key(CELL, 42, 'a', LcdConfig()))
+    lcd = LcdConfig(target='edges', hard_answers=True, threshold=0.9)
+    assert cell_key(same, 42, 'a', lcd) == cell_key(CELL, 42, 'a', LcdConfig())
 
 
 def decision(stamp_ns, is_loop, match=None):

@@ -101,6 +101,16 @@ def test_cells_do_not_see_each_other(lcd):
     assert not any(result.result.queries for result in together[2])
 
 
+def test_the_threshold_is_the_cells(lcd):
+    strict = [replace(cell, threshold=1.0) for cell in CELLS[:1]]
+    usual, = attack_frames(stream(), SAMPLE, CELLS[:1], lcd, seed=7)
+    strictly, = attack_frames(stream(), SAMPLE, strict, lcd, seed=7)
+    assert any(result.clean.is_loop for result in usual)
+    for before, after in zip(usual, strictly, strict=True):
+        assert not after.clean.is_loop or after.clean.probability == 1
+        assert before.clean.probability == after.clean.probability
+
+
 def test_transfer_asks_one_target_and_is_judged_by_another():
     lcd = LcdConfig(min_gap_s=2.0, map_window=0)
     graphs = stream(changed=60)

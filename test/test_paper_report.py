@@ -177,6 +177,23 @@ def test_headline_is_of_the_usual_size_of_graph():
     assert '(recall, query-guided, 300 features)' in words_of(rows)
 
 
+def test_another_threshold_is_another_setting():
+    rows = [make_row(sequence, perturbation=name, surrogate='none', power=power, threshold=level)
+            for sequence in SEQUENCES[:2] for level, power in ((0.5, 0.3), (0.9, 0.1))
+            for name in ('recall', 'optimum', 'eigencentrality') if name != 'eigencentrality'
+            or level == 0.5]
+    cells = summarise_cells(rows)
+    assert len(cells) == len(rows)
+    optimum = {(cell['sequence'], cell['threshold']): cell['decline_pp'] for cell in cells
+               if cell['perturbation'] == 'optimum'}
+    for cell in cells:
+        if cell['perturbation'] == 'recall':
+            assert cell['share_of_optimum'] == pytest.approx(
+                cell['decline_pp'] / optimum[cell['sequence'], cell['threshold']])
+    assert '| recall, query-guided, threshold 0.9 |' in markdown_tables(
+        cells, summarise_methods(cells), 3e-4)
+
+
 def test_headline_says_when_there_is_nothing():
     assert words_of([make_row(power=0.0)]).startswith('No black-box attack lowered')
     assert words_of([make_row(positives=60)]).startswith('No attack was measured')

@@ -106,8 +106,7 @@ def _overrides(options: Namespace) -> dict[str, Any]:
     if 'seed' in values:
         raise ConfigError('--seed is for a single attack: here --seeds says how many there are')
     lcd, builder = (chosen_settings(options, config) for config in (LcdConfig, BuilderConfig))
-    if 'target' in lcd:
-        values['target'] = lcd['target']
+    values |= {name: lcd[name] for name in ('target', 'threshold') if name in lcd}
     if 'hard_answers' in lcd:
         values['oracle'] = 'hard' if lcd['hard_answers'] else 'soft'
     if 'features' in builder:

@@ -14,6 +14,7 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.plots import Curve
 from adversarial_lcd_ros.evaluation.paper.statistics import (
     OPTIMUM,
+    USUAL,
     Cell,
     Row,
     frame_right,
@@ -72,7 +73,8 @@ def query_curves(rows: Iterable[Row], setting: Mapping[str, object], ratio: floa
     for row in rows:
         if (row['ratio'] == ratio and row['mode'] == 'query' and row['perturbation'] != OPTIMUM
                 and (row.get('asked_target') or row['target']) == row['target']
-                and all(row.get(name, '') == value for name, value in setting.items())):
+                and all(row.get(name, USUAL.get(name)) == value
+                        for name, value in setting.items())):
             method = (wording.method_title(row), str(row['perturbation']), row['surrogate'])
             spent[method][row['sequence']].append(_queries_to_turn(row))
     largest = max((float(part[np.isfinite(part)].max(initial=0.0))
@@ -166,7 +168,7 @@ def optimum_shares(cells: Sequence[Cell], setting: Cell,
     chosen = [cell for cell in cells if cell['ratio'] == ratio
               and cell['asked_target'] == cell['target'] and cell['mode'] != 'pass'
               and all(cell[name] == setting[name] for name in
-                      (('target', 'nodes') if cell['perturbation'] == OPTIMUM
+                      (('target', 'nodes', 'threshold') if cell['perturbation'] == OPTIMUM
                        else ('target', *_SHARED)))]
     perturbations: dict[str, str] = {}
     shares: dict[str, dict[str, float]] = {}

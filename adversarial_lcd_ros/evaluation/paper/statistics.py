@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import statistics
 from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE
@@ -28,10 +29,10 @@ from adversarial_lcd_ros.evaluation.summary import KINDS
 OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle', 'mode',
-        'ratio', 'edits', 'queries_per_edit', 'nodes', 'variant')
+        'ratio', 'edits', 'queries_per_edit', 'nodes', 'threshold', 'variant')
 ATTACK = CELL[1:]
-# The target that is attacked, and no unusual settings, unless a row says otherwise.
-_OPTIONAL = ('asked_target', 'variant')
+# What a row need not say.
+USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
           'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
           'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
@@ -63,8 +64,8 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
         * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
         * ``share_of_optimum``: decline over that of ``OPTIMUM`` on the same sequence, target,
-          ratio and size of graph (the largest, if there are several); None without, or if the
-          optimum takes nothing
+          ratio, size of graph and threshold (the largest, if there are several); None without,
+          or if the optimum takes nothing
         * ``duration_s``: of all repeats together
 
     Raises
@@ -151,13 +152,12 @@ def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
 
 def _cell_key(row: Row) -> tuple[Hashable, ...]:
     missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
-               if name not in row and name not in _OPTIONAL]
+               if name not in row and name not in ('asked_target', *USUAL)]
     if missing:
         raise EvaluationError(f'a row of {row.get("sequence", "an unnamed sequence")} lacks '
                               f'{", ".join(missing)}: it was not written by this release')
     # Without another target the attack asked the one that it attacks.
-    given = {**row, 'asked_target': row.get('asked_target') or row['target'],
-             'variant': row.get('variant') or ''}
+    given = {**USUAL, **row, 'asked_target': row.get('asked_target') or row['target']}
     return tuple(given[name] for name in CELL)
 
 
@@ -242,7 +242,7 @@ def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
 
 
 def _yardstick(cell: Cell) -> tuple[Hashable, ...]:
-    return cell['sequence'], cell['target'], cell['ratio'], cell['nodes']
+    return tuple(cell[name] for name in ('sequence', 'target', 'ratio', 'nodes', 'threshold'))
 
 
 def _optima(cells: Iterable[Cell]) -> dict[tuple[Hashable, ...], float]:

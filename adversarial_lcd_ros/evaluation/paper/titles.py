@@ -10,7 +10,8 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell
 
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
-          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}', 'variant': '{}'}
+          'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}',
+          'threshold': 'threshold {}', 'variant': '{}'}
 
 
 def usual_settings(cells: Sequence[Cell]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from adversarial_lcd_ros.evaluation.paper.ranks import Ranking, rank_methods
 from adversarial_lcd_ros.evaluation.paper.statistics import (
     ATTACK,
     OPTIMUM,
+    USUAL,
     Cell,
     declines_by_sequence,
     is_attackable,
@@ -30,7 +31,8 @@ from adversarial_lcd_ros.evaluation.paper.tables import (
 
 PAPER_RATIO = 3e-4
 PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'
-SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'variant')
+SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'threshold',
+           'variant')
 # Columns in the order of the paper, then ours, then the yardstick.
 _ORDER = ('svm_linear', 'svm_poly', 'naive_bayes', 'svm_rbf', 'random_flip', 'random_walk',
           'shortest_path', 'eigencentrality', 'recall', OPTIMUM)
@@ -112,6 +114,8 @@ def setting_title(setting: Cell) -> str:
         parts.append(f'{setting["queries_per_edit"]} queries an edit')
     if setting['edits'] != 'both':
         parts.append(f'{setting["edits"]} only')
+    if setting['threshold'] != USUAL['threshold']:
+        parts.append(f'threshold {setting["threshold"]:g}')
     if setting.get('variant'):
         parts.append(setting['variant'])
     return ', '.join(parts)

@@ -23,8 +23,8 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
     """
     Return the black-box attack with the largest mean decline; None without any.
 
-    Of the size of graph that most attacks have: others are experiments of their own, often on few
-    frames.
+    Of the size of graph and the threshold that most attacks have: others are experiments of their
+    own, often on few frames.
 
     Parameters
     ----------
@@ -38,8 +38,9 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
     there = [method for method in methods
              if method['perturbation'] != OPTIMUM and method['asked_target'] == method['target']
              and method['mode'] != 'pass' and target in (None, method['target'])]
-    sizes = Counter(method['nodes'] for method in there).most_common(1)
-    there = [method for method in there if method['nodes'] == sizes[0][0]]
+    kinds = Counter((method['nodes'], method['threshold']) for method in there).most_common(1)
+    there = [method for method in there
+             if (method['nodes'], method['threshold']) == kinds[0][0]]
     return max(there, key=lambda method: method['decline_pp'], default=None)
 
 

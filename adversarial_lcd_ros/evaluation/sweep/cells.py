@@ -7,7 +7,7 @@ A cell has a key, a digest of all that its figures depend on, and becomes one ro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 import hashlib
 import json
@@ -61,6 +61,8 @@ class Cell:
         Number of seeds.
     name : str
         For tables; may be empty.
+    threshold : float
+        Of the detectors: probability from which on a loop is declared.
 
     """
 
@@ -73,6 +75,7 @@ class Cell:
     frames: int
     seeds: int
     name: str = ''
+    threshold: float = LcdConfig.threshold
 
     @property
     def variant(self) -> str:
@@ -89,7 +92,7 @@ class Cell:
                 'perturbation': self.perturbation, 'surrogate': self.attack.surrogate,
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
-                'nodes': self.nodes, 'variant': self.variant}
+                'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant}
 
 
 def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
@@ -106,12 +109,14 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
         Of the detectors, but for what the cell says.
 
     """
-    detector = {name: value for name, value in asdict(lcd).items()
-                if name not in ('target', 'hard_answers', 'model')}
+    detector = {name: value for name, value in asdict(
+        replace(lcd, threshold=cell.threshold)).items()
+        if name not in ('target', 'hard_answers', 'model')}
     attack = {name: value for name, value in asdict(cell.attack).items()
               if name not in ('seed', *_FILES)}
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
-              'detector': detector, 'attack': attack, **cell.settings,
+              'detector': detector, 'attack': attack,
+              **{name: value for name, value in cell.settings.items() if name not in detector},
               'files': [file_digest(path) for path in _files(cell, lcd)]}
     return digest_of(json.dumps(values, sort_keys=True).encode())
 

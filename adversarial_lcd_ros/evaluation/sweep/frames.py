@@ -210,6 +210,7 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
 
 def _contest(cell: Cell, lcd: LcdConfig, seed: int,
              detectors: dict[LcdConfig, LoopClosureDetector]) -> _Contest:
+    lcd = replace(lcd, threshold=cell.threshold)
     judging = _detector(replace(lcd, target=cell.target, hard_answers=False), detectors)
     asked = _detector(replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'),
                       detectors)

@@ -21,14 +21,21 @@ from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
 
-from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, Config, setting
+from adversarial_lcd_ros.config import (
+    TARGETS,
+    AttackConfig,
+    BuilderConfig,
+    Config,
+    LcdConfig,
+    setting,
+)
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.optimum import Optimum
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 from adversarial_lcd_ros.evaluation.sweep.cells import ORACLES, Cell
 
-_TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
+_TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,9 @@ class CellConfig(Config):
         choices=('', *TARGETS))
     oracle: str = setting(
         'soft', 'soft: answers with probabilities; hard: decisions only.', choices=ORACLES)
+    threshold: float = setting(
+        LcdConfig.threshold, 'Probability from which on the detectors declare a loop.', low=0.0,
+        high=1.0)
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
         6, 'Frames with a loop, and as many at new places, for each seed.', low=1, high=100_000)
