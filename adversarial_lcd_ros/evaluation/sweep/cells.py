@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.sweep.frames import FrameResult
 
 # To be raised whenever the same settings give other figures: finished cells are run again.
-SCHEMA = 2
+SCHEMA = 3
 ORACLES = ('soft', 'hard')
 _TRACE_POINTS = 8
 # Attack settings that have columns of their own.
