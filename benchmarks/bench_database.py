@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig, LcdConfig
-from adversarial_lcd_ros.keyframes import Database
+from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 

@@ -22,8 +22,8 @@ from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.codec import LcdQuery
-from adversarial_lcd_ros.evaluation.graph_bags import _graph_messages
-from adversarial_lcd_ros.evaluation.pipeline import environment
+from adversarial_lcd_ros.evaluation.replay.processes import environment
+from adversarial_lcd_ros.graph_sequences.bags import _graph_messages
 from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.endpoints import payload_qos
 from adversarial_lcd_ros.nodes.lcd import LcdNode

@@ -7,10 +7,10 @@ import time
 import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
+from adversarial_lcd_ros.evaluation.store import open_store
 from adversarial_lcd_ros.evaluation.streams import open_streams
-from adversarial_lcd_ros.evaluation.sweep.cell_store import open_store
-from adversarial_lcd_ros.evaluation.sweep.recipes import load_cells
-from adversarial_lcd_ros.evaluation.sweep.sweep import plan_sweep, run_sweep
 from adversarial_lcd_ros.evaluation.workers import local_workers
 
 SIZES, RATIOS = (100, 300), (1e-4, 2e-4, 3e-4)

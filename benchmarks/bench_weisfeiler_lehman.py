@@ -7,8 +7,12 @@ import pytest
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer, flip_logits
-from adversarial_lcd_ros.weisfeiler_lehman import flip_features, node_features, pooled_features
-from adversarial_lcd_ros.wl_histogram import flip_kernels, histogram
+from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
+    flip_features,
+    node_features,
+    pooled_features,
+)
+from adversarial_lcd_ros.weisfeiler_lehman.histogram import flip_kernels, histogram
 
 ITERATIONS = 3
 CANDIDATES = 20

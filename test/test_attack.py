@@ -20,7 +20,7 @@ from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError, ConfigError, ModelError
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.weisfeiler_lehman import (
+from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     flip_features,
     iterate,
     node_features,

@@ -12,7 +12,7 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.lcd.decision import probability
 
 RING = [(k, k + 1) for k in range(2, 59)]

@@ -17,7 +17,7 @@ from adversarial_lcd_ros.config import SURROGATES as CHOICES
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.weisfeiler_lehman import (
+from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     concatenated_features,
     flip_features,
     node_features,

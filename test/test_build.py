@@ -14,13 +14,13 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import EvaluationError, ModelError, SequenceError
-from adversarial_lcd_ros.evaluation.graph_bags import build_graph_bag
-from adversarial_lcd_ros.evaluation.graph_sequences import open_graphs
-from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
-from adversarial_lcd_ros.evaluation.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+from adversarial_lcd_ros.graph_sequences.bags import build_graph_bag
+from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.paths import share_path
-from adversarial_lcd_ros.replay import Replay
 from adversarial_lcd_ros.sequences.bagfile import METADATA
+from adversarial_lcd_ros.sequences.replay import Replay
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 

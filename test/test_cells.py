@@ -12,11 +12,11 @@ from adversarial_lcd_ros.attack.attacker import AttackResult
 from adversarial_lcd_ros.codec import LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper.statistics import summarise_cells
-from adversarial_lcd_ros.evaluation.sweep import cells as cells_module
-from adversarial_lcd_ros.evaluation.sweep.cell_store import CELLS, open_store, read_cells
-from adversarial_lcd_ros.evaluation.sweep.cells import Cell, cell_key, make_row
-from adversarial_lcd_ros.evaluation.sweep.frames import FrameResult
+from adversarial_lcd_ros.evaluation.frames import cells as cells_module
+from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
+from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key, make_row
+from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
+from adversarial_lcd_ros.evaluation.store import CELLS, open_store, read_cells
 
 CELL = Cell('eigencentrality', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 

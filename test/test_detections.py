@@ -12,11 +12,11 @@ import pytest
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig, LcdConfig
 from adversarial_lcd_ros.errors import CodecError, ConfigError, SequenceError
-from adversarial_lcd_ros.evaluation.graph_sequences import open_graphs
-from adversarial_lcd_ros.inspection import identify_payload
+from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.detections import read_detections
+from adversarial_lcd_ros.sequences.inspection import identify_payload
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 from adversarial_lcd_ros.vision.detections import (
     MAX_EARLY,

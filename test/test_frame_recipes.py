@@ -3,8 +3,8 @@
 import pytest
 
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.recipes import load_recipe
-from adversarial_lcd_ros.evaluation.sweep.recipes import load_cells
 
 
 def written(tmp_path, text):

@@ -13,9 +13,13 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.sweep import frames
-from adversarial_lcd_ros.evaluation.sweep.cells import Cell
-from adversarial_lcd_ros.evaluation.sweep.frames import FrameSample, attack_frames, sample_frames
+from adversarial_lcd_ros.evaluation.frames import attacked as frames
+from adversarial_lcd_ros.evaluation.frames.attacked import (
+    FrameSample,
+    attack_frames,
+    sample_frames,
+)
+from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 
 RING = [(k, k + 1) for k in range(2, 29)] + [(k % 2, k) for k in range(4, 30)]

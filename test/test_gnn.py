@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.evaluation.training import gnn as gnn_training
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK, GnnTarget, network_inputs
-from adversarial_lcd_ros.lcd.training import LabelledPairs
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.training import gnn as gnn_training
+from adversarial_lcd_ros.training.pair_scores import LabelledPairs
 
 GRAPH = make_graph(30, [(0, 1), *((0, k) for k in range(2, 12)), *((k, k + 1) for k in
                                                                   range(2, 29))], objects=2)

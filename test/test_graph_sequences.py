@@ -12,9 +12,9 @@ import pytest
 from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
-from adversarial_lcd_ros.evaluation import graph_sequences
-from adversarial_lcd_ros.evaluation.graph_cache import load_graphs, save_graphs
-from adversarial_lcd_ros.evaluation.graph_sequences import open_graphs
+from adversarial_lcd_ros.graph_sequences import opening as graph_sequences
+from adversarial_lcd_ros.graph_sequences.cache import load_graphs, save_graphs
+from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 PAYLOAD = 'std_msgs/msg/UInt8MultiArray'

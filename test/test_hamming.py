@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 import numpy as np
 
-from adversarial_lcd_ros.hamming import lanes, mutual, nearest
+from adversarial_lcd_ros.compiled.hamming import lanes, mutual, nearest
 
 
 def descriptors(least):

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import keyframe_blocks, keyframes
-from adversarial_lcd_ros.keyframes import Database
+from adversarial_lcd_ros.keyframes import blocks
+from adversarial_lcd_ros.keyframes import database as keyframes
+from adversarial_lcd_ros.keyframes.database import Database
 
 PLAIN = make_graph()
 
@@ -50,7 +51,7 @@ def by_sorting(stored, query, admissible, count, window):
 
 
 def test_a_column_in_common_is_no_word_in_common(monkeypatch):
-    monkeypatch.setattr(keyframe_blocks, 'COLUMNS', 2)
+    monkeypatch.setattr(blocks, 'COLUMNS', 2)
     database = Database()
     for words in ({0: 0.5}, {1: 0.5}, {2: 0.5, 3: 0.5}):
         database.add(with_words(words))
@@ -67,8 +68,8 @@ def test_retrieval_is_what_sorting_all_scores_gives(
     *stored, query = graphs
     admissible = np.array([random.random() < 0.7 for _ in stored], bool)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(keyframe_blocks, 'COLUMNS', columns)
-        for module in (keyframe_blocks, keyframes):
+        patch.setattr(blocks, 'COLUMNS', columns)
+        for module in (blocks, keyframes):
             patch.setattr(module, 'KEYFRAMES', 3)
         patch.setattr(keyframes, 'LEAST_SCORED', least)
         database = Database()

@@ -9,9 +9,13 @@ from test_labels import path
 
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import LabelConfig
-from adversarial_lcd_ros.evaluation.label_sweep import label_variants, sweep_labels, write_sweep
-from adversarial_lcd_ros.evaluation.labels import label_frames
-from adversarial_lcd_ros.evaluation.records import AttackRun, make_records
+from adversarial_lcd_ros.evaluation.replay.label_sweep import (
+    label_variants,
+    sweep_labels,
+    write_sweep,
+)
+from adversarial_lcd_ros.evaluation.replay.records import AttackRun, make_records
+from adversarial_lcd_ros.ground_truth.labels import label_frames
 
 SIZE = (640, 480)
 BASE = LabelConfig(min_gap_s=5.0)

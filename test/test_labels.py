@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation.labels import NO_MATCH, label_frames, relation
-from adversarial_lcd_ros.evaluation.pairs import sample_pairs
-from adversarial_lcd_ros.evaluation.views import GRID_POINTS, visible_points
+from adversarial_lcd_ros.ground_truth.labels import NO_MATCH, label_frames, relation
+from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
+from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 
 SIZE = (640, 480)
 FORWARD = (0.0, 0.0, 0.0, 1.0)
@@ -91,7 +91,7 @@ def test_overlap_does_not_depend_on_the_size_of_its_blocks(monkeypatch):
     rng = np.random.default_rng(1)
     position, quaternion = rng.normal(size=(50, 3)), Rotation.random(50, random_state=1).as_quat()
     whole = overlap(position, quaternion)
-    monkeypatch.setattr('adversarial_lcd_ros.evaluation.views._BLOCK_VALUES', 1)
+    monkeypatch.setattr('adversarial_lcd_ros.ground_truth.overlap._BLOCK_VALUES', 1)
     assert np.array_equal(overlap(position, quaternion), whole)
 
 

@@ -14,7 +14,7 @@ from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.keyframes import Database, bow_score
+from adversarial_lcd_ros.keyframes.database import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS, make_target, prepare

@@ -14,11 +14,11 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation import live
-from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
-from adversarial_lcd_ros.evaluation.offline import run_offline
-from adversarial_lcd_ros.evaluation.pipeline import Recording
 from adversarial_lcd_ros.evaluation.recipes import load_recipe
+from adversarial_lcd_ros.evaluation.replay import run as live
+from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.processes import Recording
+from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
 from adversarial_lcd_ros.paths import share_path
 
 SUMMARY_FIELDS = {

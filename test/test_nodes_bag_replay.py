@@ -8,7 +8,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
-from adversarial_lcd_ros.replay import read_payloads
+from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 

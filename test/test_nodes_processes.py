@@ -10,7 +10,7 @@ import time
 import pytest
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.replay import read_payloads
+from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation.optimum import Optimum, run_optimum
+from adversarial_lcd_ros.evaluation.frames.optimum import Optimum, run_optimum
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS

@@ -13,13 +13,13 @@ from paper_factory import SEQUENCES, make_row, make_rows
 import pytest
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper import figures, views, words
+from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import latex_escape, latex_table
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
-from adversarial_lcd_ros.evaluation.paper.statistics import summarise_cells, summarise_methods
+from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells, summarise_methods
 from adversarial_lcd_ros.evaluation.pictures import Picture, write_pictures
 
 POWERS = {'svm_linear': 0.1, 'svm_poly': 0.2, 'naive_bayes': 0.3, 'svm_rbf': 0.5}
@@ -48,7 +48,7 @@ def surrogate_rows(powers=POWERS, sequences=SEQUENCES, **settings):
 
 def words_of(rows):
     cells = summarise_cells(rows)
-    return words.headline(summarise_methods(cells), views.main_ratio(cells))
+    return verdicts.headline(summarise_methods(cells), tables.main_ratio(cells))
 
 
 @pytest.fixture(scope='module')
@@ -204,8 +204,8 @@ def test_headline_says_when_there_is_nothing():
 
 def test_verdict_follows_the_data():
     def verdict(powers, sequences=SEQUENCES):
-        table, = views.surrogate_tables(summarise_cells(surrogate_rows(powers, sequences)))
-        return words.verdict(table)
+        table, = tables.surrogate_tables(summarise_cells(surrogate_rows(powers, sequences)))
+        return verdicts.verdict(table)
 
     assert 'ranking comes out in the means: SVM-RBF' in verdict(POWERS)
     assert 'Beyond chance with 4 sequences: SVM-RBF and SVM-linear.' in verdict(POWERS)
@@ -222,30 +222,30 @@ def test_verdict_over_budgets():
     rows = [make_row(sequence, perturbation=name, ratio=ratio, power=power, frames=200)
             for sequence in SEQUENCES[:2] for ratio, ahead in ((1e-4, 0.1), (3e-4, 0.6))
             for name, power in (('eigencentrality', ahead), ('random_walk', 0.3))]
-    table, = views.budget_tables(summarise_cells(rows))
+    table, = tables.budget_tables(summarise_cells(rows))
     assert [line.title for line in table.lines] == ['0.0001', '0.0003']
-    assert 'most at 1 of 2 ratios' in words.verdict(table)
+    assert 'most at 1 of 2 ratios' in verdicts.verdict(table)
 
 
 def test_tables_compare_one_thing_at_a_time():
     cells = summarise_cells(make_rows(seeds=(0,), sequences=SEQUENCES[:2]))
-    tables = views.perturbation_tables(cells)
-    assert tables[0].columns == ('random flip', 'random walk', 'shortest path',
-                                 'eigencentrality', 'recall', 'optimum (yardstick)')
+    found = tables.perturbation_tables(cells)
+    assert found[0].columns == ('random flip', 'random walk', 'shortest path',
+                                'eigencentrality', 'recall', 'optimum (yardstick)')
     # Transfer is no column, the yardstick is not ranked, and the best is never the yardstick.
-    assert [table.setting['target'] for table in tables].count('anchored') == 1
+    assert [table.setting['target'] for table in found].count('anchored') == 1
     assert 'optimum (yardstick)' not in {
-        method.name for method in tables[0].ranking.methods}
-    assert tables[0].lines[0].strongest['perturbation'] == 'recall'
-    assert {entry['surrogate'] for entry in tables[0].lines[0].entries} == {'svm_rbf', 'none'}
+        method.name for method in found[0].ranking.methods}
+    assert found[0].lines[0].strongest['perturbation'] == 'recall'
+    assert {entry['surrogate'] for entry in found[0].lines[0].entries} == {'svm_rbf', 'none'}
 
 
 def test_sequences_without_a_column_are_left_out_and_told():
     rows = surrogate_rows()[:-1]
-    tables = views.surrogate_tables(summarise_cells(rows))
-    assert tables[0].mean.entries[0]['sequences'] == sorted(SEQUENCES[:3])
-    assert len(tables[0].ranking.sequences) == 3
-    texts = words.warnings(summarise_cells(rows), tables)
+    found = tables.surrogate_tables(summarise_cells(rows))
+    assert found[0].mean.entries[0]['sequences'] == sorted(SEQUENCES[:3])
+    assert len(found[0].ranking.sequences) == 3
+    texts = verdicts.warnings(summarise_cells(rows), found)
     assert any(text.startswith('synthetic_office is not in the mean and the ranks of table 3 (')
                for text in texts)
 
@@ -254,7 +254,7 @@ def test_a_sequence_that_trained_the_detector_is_no_test_of_it():
     seen = SEQUENCES[0], 'wl'
     rows = [make_row(sequence, target=target, trained_on=(sequence, target) == seen)
             for sequence in SEQUENCES[:2] for target in ('wl', 'edges')]
-    texts = [text for text in words.warnings(summarise_cells(rows), []) if 'training' in text]
+    texts = [text for text in verdicts.warnings(summarise_cells(rows), []) if 'training' in text]
     assert texts == [f'{SEQUENCES[0]} was seen in training by wl: it is no test of what they are '
                      'worth.']
 
@@ -262,22 +262,22 @@ def test_a_sequence_that_trained_the_detector_is_no_test_of_it():
 def test_warnings():
     rows = [make_row(SEQUENCES[0], positives=60), make_row(SEQUENCES[1], frames=40),
             make_row(SEQUENCES[2], nodes=50)]
-    texts = ' '.join(words.warnings(summarise_cells(rows), []))
+    texts = ' '.join(verdicts.warnings(summarise_cells(rows), []))
     assert 'synthetic_tour has no new places' in texts
     assert 'synthetic_kitchen: 20 different frames with a loop and 20 at' in texts
     assert 'in 1 of 3 cells, 100.0' in texts
     assert 'Seeds: 1 ' in texts
     again = [make_row(SEQUENCES[1], frames=40, seed=seed) for seed in range(10)]
-    assert '20 different frames' in ' '.join(words.warnings(summarise_cells(again), []))
+    assert '20 different frames' in ' '.join(verdicts.warnings(summarise_cells(again), []))
     ten = [make_row(seed=seed, frames=200) for seed in range(10)]
-    assert words.warnings(summarise_cells(ten), []) == []
+    assert verdicts.warnings(summarise_cells(ten), []) == []
 
 
 def test_query_curves_end_at_the_share_turned():
     rows = [make_row(sequence, perturbation='recall', surrogate='none', seed=seed, frames=200)
             for sequence in SEQUENCES[:2] for seed in (0, 1)]
-    setting = {name: rows[0][name] for name in views.SETTING}
-    curve, = figures.query_curves(rows, setting, 3e-4)
+    setting = {name: rows[0][name] for name in tables.SETTING}
+    curve, = curves.query_curves(rows, setting, 3e-4)
     assert np.all(np.diff(curve.share) >= 0)
     turned = [sum(frame['attacked'] != frame['clean'] for row in rows
                   if row['sequence'] == sequence for frame in row['frame_results'])
@@ -285,7 +285,7 @@ def test_query_curves_end_at_the_share_turned():
                     if row['sequence'] == sequence for frame in row['frame_results'])
               for sequence in SEQUENCES[:2]]
     assert curve.share[-1] == pytest.approx(np.mean(turned))
-    assert figures.query_curves(rows, {**setting, 'target': 'edges'}, 3e-4) == []
+    assert curves.query_curves(rows, {**setting, 'target': 'edges'}, 3e-4) == []
 
 
 def test_map_of_targets_holds_transfer():
@@ -293,14 +293,14 @@ def test_map_of_targets_holds_transfer():
                      asked_target=asked, frames=100)
             for target, asked, power in (('wl', 'wl', 0.4), ('anchored', 'anchored', 0.6),
                                          ('anchored', 'wl', 0.2))]
-    found = figures.target_map(summarise_cells(rows), 3e-4)
+    found = curves.target_map(summarise_cells(rows), 3e-4)
     assert found.attacks == ('recall, query-guided', 'recall, query-guided, asked wl')
     assert found.targets == ('wl', 'anchored')
     assert found.transfer
     assert found.declines == pytest.approx(np.array(
         [[rows[0]['decline_pp'], rows[1]['decline_pp']],
          [rows[0]['decline_pp'], rows[2]['decline_pp']]]))
-    assert figures.target_map(summarise_cells(rows[:1]), 3e-4) is None
+    assert curves.target_map(summarise_cells(rows[:1]), 3e-4) is None
 
 
 @pytest.mark.parametrize('count', [2, 3, 9])
@@ -313,7 +313,7 @@ def test_critical_difference_diagram_of_many_and_few(count):
 def test_latex_is_escaped_and_whole():
     assert latex_escape('a_b & 50% {x} \\ ~^#$') == (
         r'a\_b \& 50\% \{x\} \textbackslash{} \textasciitilde{}\textasciicircum{}\#\$')
-    table, = views.surrogate_tables(summarise_cells(
+    table, = tables.surrogate_tables(summarise_cells(
         [{**row, 'sequence': row['sequence'] + '_50%'} for row in surrogate_rows()]))
     text = latex_table(table)
     assert text.count(r'\begin{table}') == text.count(r'\end{table}') == 1

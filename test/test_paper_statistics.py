@@ -5,8 +5,8 @@ from paper_factory import SEQUENCES, make_row, make_rows
 import pytest
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation import statistics
-from adversarial_lcd_ros.evaluation.paper.statistics import (
+from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
     declines_by_sequence,
     summarise_cells,
@@ -75,8 +75,8 @@ def test_interval_of_one_seed_is_that_of_the_evaluation():
     kind = np.array([frame['kind'] for frame in frames], np.int8)
     before, after = (np.isin([frame[which] for frame in frames], ('TP', 'TN'))
                      for which in ('clean', 'attacked'))
-    block = statistics.block_frames(np.array([frame['stamp'] for frame in frames]))
-    assert summarise_cells([row])[0]['ci95'] == statistics.decline_interval(
+    block = intervals.block_frames(np.array([frame['stamp'] for frame in frames]))
+    assert summarise_cells([row])[0]['ci95'] == intervals.decline_interval(
         kind, before, after, block, seed=0)
 
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
-from adversarial_lcd_ros.evaluation.paper.tables import (
+from adversarial_lcd_ros.evaluation.paper.printed import (
     AUTORANK_TABLE,
     BUDGET_TABLE,
     OURS,
@@ -17,6 +16,7 @@ from adversarial_lcd_ros.evaluation.paper.tables import (
     misprints,
     repaired_surrogate_table,
 )
+from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
 
 
 def ranking_of(columns):

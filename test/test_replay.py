@@ -17,9 +17,9 @@ import yaml
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.replay import BagRecorder, Replay, read_payloads
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
+from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay, read_payloads
 
 PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
 PERIOD_S = make.PERIOD_NS / 1e9

@@ -11,17 +11,18 @@ from rich.console import Console
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation import report, results, tables, wording
-from adversarial_lcd_ros.evaluation.labels import label_frames
+from adversarial_lcd_ros.evaluation import results, wording
 from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
-from adversarial_lcd_ros.evaluation.records import (
+from adversarial_lcd_ros.evaluation.replay import report, tables
+from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     make_records,
     read_records,
     runs_of,
     write_records,
 )
-from adversarial_lcd_ros.evaluation.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.ground_truth.labels import label_frames
 
 COUNT = 60
 ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',

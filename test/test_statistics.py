@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.statistics import (
+from adversarial_lcd_ros.evaluation.intervals import (
     balanced_accuracy_interval,
     block_frames,
     decline_interval,

@@ -14,17 +14,17 @@ import pytest
 from sweep_factory import LABELS, NODES, RECIPE, builder_config, lcd_config, walk_folder
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.paper.statistics import summarise_cells
-from adversarial_lcd_ros.evaluation.streams import load_stream_graphs, open_streams
-from adversarial_lcd_ros.evaluation.sweep import sweep as sweep_module
-from adversarial_lcd_ros.evaluation.sweep.cell_store import open_store
-from adversarial_lcd_ros.evaluation.sweep.recipes import load_cells
-from adversarial_lcd_ros.evaluation.sweep.sweep import (
+from adversarial_lcd_ros.evaluation.frames import run as sweep_module
+from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.frames.run import (
     kinds_of_cells,
     plan_sweep,
     run_sweep,
     run_task,
 )
+from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
+from adversarial_lcd_ros.evaluation.store import open_store
+from adversarial_lcd_ros.evaluation.streams import load_stream_graphs, open_streams
 from adversarial_lcd_ros.evaluation.workers import dask_workers, local_workers
 
 TIMES = ('query_s', 'search_s', 'judge_s', 'duration_s')

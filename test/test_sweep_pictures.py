@@ -6,11 +6,11 @@ import pytest
 from sweep_factory import LABELS, NODES, builder_config, lcd_config, walk_folder
 
 from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.pictures import sweep_pictures
+from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
+from adversarial_lcd_ros.evaluation.store import open_store
 from adversarial_lcd_ros.evaluation.streams import open_streams
-from adversarial_lcd_ros.evaluation.sweep.cell_store import open_store
-from adversarial_lcd_ros.evaluation.sweep.cells import Cell
-from adversarial_lcd_ros.evaluation.sweep.pictures import sweep_pictures
-from adversarial_lcd_ros.evaluation.sweep.sweep import plan_sweep, run_sweep
 
 ATTACK = AttackConfig(perturbation='random_flip', surrogate='none', ratio=0.5, queries_per_edit=1)
 CELLS = [Cell('random_flip', ATTACK, 'wl', 'wl', 'soft', NODES, 3, 2),

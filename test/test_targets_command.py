@@ -9,10 +9,10 @@ from sweep_factory import walk_folder
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation import workers
-from adversarial_lcd_ros.evaluation.targets.recipes import Choices, recipe_sequences
-from adversarial_lcd_ros.evaluation.targets.tables import target_tables
-from adversarial_lcd_ros.evaluation.training.model_folder import trained_on
+from adversarial_lcd_ros.evaluation.detectors.recipe import Choices, recipe_sequences
+from adversarial_lcd_ros.evaluation.detectors.tables import target_tables
 from adversarial_lcd_ros.paths import model_path
+from adversarial_lcd_ros.training.model_folder import trained_on
 
 NOTHING = Choices({}, {}, {})
 

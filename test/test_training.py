@@ -18,10 +18,10 @@ from adversarial_lcd_ros.errors import (
     ModelError,
     SequenceError,
 )
-from adversarial_lcd_ros.evaluation.training import run as training_run
-from adversarial_lcd_ros.evaluation.training.run import TrainingPlan, train
-from adversarial_lcd_ros.evaluation.training.sources import TrainingSource, with_licences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.training import run as training_run
+from adversarial_lcd_ros.training.run import TrainingPlan, train
+from adversarial_lcd_ros.training.sources import TrainingSource, with_licences
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 LAP, PERIOD_NS = 20, 500_000_000

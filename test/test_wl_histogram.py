@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 
-from adversarial_lcd_ros.wl_histogram import flip_kernels, histogram
+from adversarial_lcd_ros.weisfeiler_lehman.histogram import flip_kernels, histogram
 
 
 def by_multisets(graph, label, iterations):

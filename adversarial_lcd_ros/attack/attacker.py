@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.oracle import Ask, Oracle, OracleSilentError, edit_budget
-from adversarial_lcd_ros.attack.outcome import Hunt, Search
-from adversarial_lcd_ros.attack.recall import Recall
-from adversarial_lcd_ros.attack.stepwise import Stepwise
+from adversarial_lcd_ros.attack.search import Hunt, Search
+from adversarial_lcd_ros.attack.searches.recall import Recall
+from adversarial_lcd_ros.attack.searches.stepwise import Stepwise
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.codec import AttackReport
 from adversarial_lcd_ros.config import AttackConfig

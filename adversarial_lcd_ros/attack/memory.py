@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from adversarial_lcd_ros.compiled.hamming import lanes, mutual
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.hamming import lanes, mutual
-from adversarial_lcd_ros.keyframes import Database
+from adversarial_lcd_ros.keyframes.database import Database
 
 MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76

@@ -33,7 +33,7 @@ def add(commands: Commands) -> None:
 
 
 def _build(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.graph_bags import build_graph_bag
+    from adversarial_lcd_ros.graph_sequences.bags import build_graph_bag
 
     config = config_from_options(options, BuilderConfig)
     with progress_bar(f'building {Path(options.source).name}') as progress:

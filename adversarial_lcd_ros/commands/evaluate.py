@@ -103,9 +103,13 @@ def _demo(options: Namespace) -> None:
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
     from rich.console import Console
 
-    from adversarial_lcd_ros.evaluation.live import Plan, evaluate_live
     from adversarial_lcd_ros.evaluation.recipes import load_recipe
-    from adversarial_lcd_ros.evaluation.tables import decline_table, figure_table, sweep_table
+    from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+    from adversarial_lcd_ros.evaluation.replay.tables import (
+        decline_table,
+        figure_table,
+        sweep_table,
+    )
     from adversarial_lcd_ros.evaluation.wording import headline
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))

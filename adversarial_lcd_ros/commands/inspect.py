@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from adversarial_lcd_ros.commands.common import Commands, add_command
 
 if TYPE_CHECKING:
-    from adversarial_lcd_ros.inspection import BagSummary
+    from adversarial_lcd_ros.sequences.inspection import BagSummary
 
 
 def add(commands: Commands) -> None:
@@ -20,8 +20,8 @@ def add(commands: Commands) -> None:
 
 
 def _inspect(options: Namespace) -> None:
-    from adversarial_lcd_ros.inspection import inspect_bag, inspect_payload
     from adversarial_lcd_ros.sequences.bagfile import is_bag
+    from adversarial_lcd_ros.sequences.inspection import inspect_bag, inspect_payload
 
     if options.path.is_file() and not is_bag(options.path):
         _show_payload(*inspect_payload(options.path))

@@ -16,6 +16,6 @@ def add(commands: Commands) -> None:
 
 
 def _report(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.report import report_folder
+    from adversarial_lcd_ros.evaluation.replay.report import report_folder
 
     print(report_folder(options.folder))

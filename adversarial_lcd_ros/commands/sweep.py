@@ -24,8 +24,8 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 
 if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.frames.run import Row, Sweep
     from adversarial_lcd_ros.evaluation.streams import Stream
-    from adversarial_lcd_ros.evaluation.sweep.sweep import Row, Sweep
     from adversarial_lcd_ros.evaluation.workers import Run
 
 _OPTIONS = ('jobs', 'scheduler', 'seeds', 'cache')
@@ -54,12 +54,12 @@ def refuse_options(options: Namespace) -> None:
 
 def run(options: Namespace) -> None:
     """Run the recipe, or what is left of it, and write the report."""
+    from adversarial_lcd_ros.evaluation.frames.pictures import sweep_pictures
+    from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+    from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
     from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
-    from adversarial_lcd_ros.evaluation.sweep.cell_store import open_store
-    from adversarial_lcd_ros.evaluation.sweep.pictures import sweep_pictures
-    from adversarial_lcd_ros.evaluation.sweep.recipes import load_cells
-    from adversarial_lcd_ros.evaluation.sweep.sweep import plan_sweep, run_sweep
+    from adversarial_lcd_ros.evaluation.store import open_store
 
     started = time.monotonic()
     _check(options)
@@ -132,8 +132,8 @@ def _open(options: Namespace, nodes: list[int]) -> list[Stream]:
 
 def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
                  cells: list[dict[str, Any]]) -> None:
+    from adversarial_lcd_ros.evaluation.frames.run import FIRST_SEED, versions_digest
     from adversarial_lcd_ros.evaluation.results import ENVIRONMENT, ResultsFolder, environment
-    from adversarial_lcd_ros.evaluation.sweep.sweep import FIRST_SEED, versions_digest
 
     results = ResultsFolder(folder)
     results.write_setup(
@@ -194,7 +194,7 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from adversarial_lcd_ros.evaluation.sweep.sweep import kinds_of_cells
+    from adversarial_lcd_ros.evaluation.frames.run import kinds_of_cells
 
     table = Table('attack', 'frames', 'queries, ms', 'search, ms', 'judging, ms',
                   title='Processor time a frame')

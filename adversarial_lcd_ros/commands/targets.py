@@ -15,9 +15,9 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import add_config_options, add_models_option, chosen_settings
 
 if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.detectors.recipe import TargetSequence
+    from adversarial_lcd_ros.evaluation.detectors.run import TargetTask
     from adversarial_lcd_ros.evaluation.streams import Stream
-    from adversarial_lcd_ros.evaluation.targets.recipes import TargetSequence
-    from adversarial_lcd_ros.evaluation.targets.run import TargetTask
 
 PROTOCOLS = ('pairs', 'live')
 TABLES = 'target.md'
@@ -65,10 +65,10 @@ def add(commands: Commands) -> None:
 
 
 def _run(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.detectors.run import run_target
+    from adversarial_lcd_ros.evaluation.detectors.tables import target_tables
     from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder
-    from adversarial_lcd_ros.evaluation.sweep.cell_store import open_store
-    from adversarial_lcd_ros.evaluation.targets.run import run_target
-    from adversarial_lcd_ros.evaluation.targets.tables import target_tables
+    from adversarial_lcd_ros.evaluation.store import open_store
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
     for name in ('pairs', 'draws', 'jobs'):
@@ -96,7 +96,7 @@ def _run(options: Namespace) -> None:
 
 
 def _sequences(options: Namespace) -> list[TargetSequence]:
-    from adversarial_lcd_ros.evaluation.targets.recipes import (
+    from adversarial_lcd_ros.evaluation.detectors.recipe import (
         Choices,
         named_sequences,
         recipe_sequences,
@@ -115,7 +115,7 @@ def _sequences(options: Namespace) -> list[TargetSequence]:
 
 
 def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTask]:
-    from adversarial_lcd_ros.evaluation.targets.run import TargetTask
+    from adversarial_lcd_ros.evaluation.detectors.run import TargetTask
 
     seeds = tuple(range(options.seed, options.seed + options.draws))
     return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds,

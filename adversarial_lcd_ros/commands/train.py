@@ -48,13 +48,13 @@ def add(commands: Commands) -> None:
 
 
 def _train(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.training.run import (
+    from adversarial_lcd_ros.training.run import (
         DEFAULT_TARGETS,
         TRAINING_LABELS,
         TrainingPlan,
         train,
     )
-    from adversarial_lcd_ros.evaluation.training.sources import TrainingSource, with_licences
+    from adversarial_lcd_ros.training.sources import TrainingSource, with_licences
 
     sources = with_licences([TrainingSource.parse(text) for text in options.sequences],
                             options.licence)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sklearn.metrics import average_precision_score, matthews_corrcoef, precision_recall_curve
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.labels import NEGATIVE, POSITIVE
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 Outcomes = NDArray[np.str_]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.records import QueryRecord
+from adversarial_lcd_ros.evaluation.replay.records import QueryRecord
 from adversarial_lcd_ros.evaluation.results import PICTURES, read_json
 
 _INDEX = 'pictures.json'

@@ -11,11 +11,11 @@ from pathlib import Path
 from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.graph_sequences import GraphSequence, holds_graphs, open_graphs
-from adversarial_lcd_ros.evaluation.labels import FrameLabels, label_frames
-from adversarial_lcd_ros.evaluation.training.sources import TrainingSource
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, holds_graphs, open_graphs
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames
 from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.training.sources import TrainingSource
 
 _KEPT = 6
 

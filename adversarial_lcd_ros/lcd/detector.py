@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.keyframes import Database
+from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.geometry import count_inliers
 from adversarial_lcd_ros.lcd.targets import Scores, make_target, prepare

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.incidence import LENGTH_SCALE, Incidence, vectorised
+from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE, Incidence, vectorised
 from adversarial_lcd_ros.lcd.kernels import MIN_COSINE, NEIGHBOUR_WEIGHT, dot
 
 _TINY = 1e-12

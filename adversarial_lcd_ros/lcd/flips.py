@@ -2,7 +2,7 @@
 Log odds of a loop closure after every single flip of a graph, at once.
 
 No attack on a black box has this: it looks into the detector. It is the yardstick for those that
-ask (evaluation/optimum.py).
+ask (evaluation/frames/optimum.py).
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.hamming import lanes, mutual
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.hamming import lanes, mutual
 
 MAX_HAMMING = 64
 # A fundamental matrix takes seven matches; eight is the first number that can disagree.

@@ -13,8 +13,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.hamming import compiled
-from adversarial_lcd_ros.incidence import vectorised
+from adversarial_lcd_ros.compiled.hamming import compiled
+from adversarial_lcd_ros.compiled.incidence import vectorised
 
 MIN_COSINE = 0.4
 NEIGHBOUR_WEIGHT = 0.5

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.hamming import lanes, mutual
+from adversarial_lcd_ros.compiled.incidence import Incidence, incidence
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
-from adversarial_lcd_ros.hamming import lanes, mutual
-from adversarial_lcd_ros.incidence import Incidence, incidence
 from adversarial_lcd_ros.lcd import kernels
 from adversarial_lcd_ros.lcd.kernels import MIN_COSINE
 

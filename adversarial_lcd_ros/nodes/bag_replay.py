@@ -21,7 +21,7 @@ from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qo
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
-from adversarial_lcd_ros.replay import BagRecorder, Replay
+from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 GRAPHS = CLEAN, _ = 'graph_clean', 'graph'

@@ -11,9 +11,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.hamming import descend, lanes, nearest
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES
-from adversarial_lcd_ros.hamming import descend, lanes, nearest
 
 ROUNDS = 12
 # Descriptors that are unpacked at a time: bounds the memory of training.

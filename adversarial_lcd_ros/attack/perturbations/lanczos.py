@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.incidence import vectorised
+from adversarial_lcd_ros.compiled.incidence import vectorised
 
 MOST_STEPS = 160
 _CHECK_EVERY = 4

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.statistics import Cell, Row
-from adversarial_lcd_ros.evaluation.paper.views import DeclineTable, Line
+from adversarial_lcd_ros.evaluation.paper.summaries import Cell, Row
+from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
 
 SUMMARY, CELLS_CSV, SUMMARY_CSV, TABLES_TEX = (
     'summary.json', 'cells.csv', 'summary.csv', 'tables.tex')

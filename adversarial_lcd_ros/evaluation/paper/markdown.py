@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.statistics import (
+from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
     OPTIMUM,
     Cell,

@@ -13,22 +13,23 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation import plots, statistics, wording
-from adversarial_lcd_ros.evaluation.paper import figures, views, words
+from adversarial_lcd_ros.evaluation import intervals, wording
+from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import write_exports, write_text
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
-from adversarial_lcd_ros.evaluation.paper.statistics import (
+from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
+from adversarial_lcd_ros.evaluation.paper.summaries import (
     Cell,
     Row,
     summarise_cells,
     summarise_methods,
 )
-from adversarial_lcd_ros.evaluation.paper.tables import PRINTED_TABLES, misprints
+from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
-from adversarial_lcd_ros.evaluation.paper.views import DeclineTable
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
-from adversarial_lcd_ros.evaluation.report import data_uri, load_template
+from adversarial_lcd_ros.evaluation.replay import plots
+from adversarial_lcd_ros.evaluation.replay.report import data_uri, load_template
 from adversarial_lcd_ros.evaluation.results import REPORT
 
 TABLES_MD = 'tables.md'
@@ -60,61 +61,62 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
     if not rows:
         raise EvaluationError(f'{folder}: no cell is finished yet; nothing can be reported')
     cells = summarise_cells(rows)
-    tables = [views.surrogate_tables(cells), views.perturbation_tables(cells),
-              views.budget_tables(cells)]
-    write_exports(folder, rows, cells, [table for group in tables for table in group])
+    groups = [tables.surrogate_tables(cells), tables.perturbation_tables(cells),
+              tables.budget_tables(cells)]
+    write_exports(folder, rows, cells, [table for group in groups for table in group])
     write_text(folder / TABLES_MD, markdown_tables(cells, summarise_methods(cells),
-                                                   views.main_ratio(cells)))
+                                                   tables.main_ratio(cells)))
     pictures = [(title, caption, data_uri(data, 'jpeg'))
                 for title, caption, data in read_pictures(folder)[:_PICTURES]]
     path = folder / REPORT
     write_text(path, load_template('paper.html.j2').render(
-        {**_values(rows, cells, tables), 'pictures': pictures}))
+        {**_values(rows, cells, groups), 'pictures': pictures}))
     return path
 
 
 def _values(rows: Sequence[Row], cells: Sequence[Cell],
-            tables: Sequence[list[DeclineTable]]) -> dict[str, Any]:
-    ratio = views.main_ratio(cells)
+            groups: Sequence[list[DeclineTable]]) -> dict[str, Any]:
+    ratio = tables.main_ratio(cells)
     methods = summarise_methods(cells)
     usual = usual_settings(cells)
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
-        'headline': words.headline(methods, ratio),
-        'best': words.strongest(here, words.main_target(here)),
-        'warnings': words.warnings(cells, tables[0] + tables[1]),
+        'headline': verdicts.headline(methods, ratio),
+        'best': verdicts.strongest(here, verdicts.main_target(here)),
+        'warnings': verdicts.warnings(cells, groups[0] + groups[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
         'usual': usual_title(usual),
-        'verdicts': [(name, words.verdict(group[0])) for name, group in zip(
-            ('Surrogates', 'Perturbations'), tables, strict=False) if group],
-        'surrogates': _blocks(tables[0]), 'perturbations': _blocks(tables[1]),
-        'budgets': _blocks(tables[2]), 'notes': _notes(),
+        'verdicts': [(name, verdicts.verdict(group[0])) for name, group in zip(
+            ('Surrogates', 'Perturbations'), groups, strict=False) if group],
+        'surrogates': _blocks(groups[0]), 'perturbations': _blocks(groups[1]),
+        'budgets': _blocks(groups[2]), 'notes': _notes(),
         'cells': _cells([cell for cell in cells if cell['ratio'] == ratio], usual),
-        'block_s': statistics.BLOCK_S, **_plots(rows, cells, tables, ratio)}
+        'block_s': intervals.BLOCK_S, **_plots(rows, cells, groups, ratio)}
 
 
-def _plots(rows: Sequence[Row], cells: Sequence[Cell], tables: Sequence[list[DeclineTable]],
+def _plots(rows: Sequence[Row], cells: Sequence[Cell], groups: Sequence[list[DeclineTable]],
            ratio: float) -> dict[str, Any]:
     values: dict[str, Any] = dict.fromkeys(
         ('budget_plot', 'success_plot', 'success_setting', 'share_plot', 'map_plot', 'transfer'))
-    if tables[2]:
-        values['budget_plot'] = _plot(lambda width: paper_plots.budget_curves(tables[2][0], width))
+    if groups[2]:
+        values['budget_plot'] = _plot(lambda width: paper_plots.budget_curves(groups[2][0], width))
     # Of the perturbations' setting, or else of the surrogates'; of query-guided attacks.
-    settings = [table.setting for group in tables[1::-1] for table in group]
+    settings = [table.setting for group in groups[1::-1] for table in group]
     guided = next((setting for setting in settings if setting['mode'] == 'query'), None)
     if guided is not None:
-        curves = figures.query_curves(rows, guided, ratio)
-        if curves:
-            values['success_plot'] = _plot(lambda width: paper_plots.success_curves(curves, width))
-            values['success_setting'] = views.setting_title(guided)
+        successes = curves.query_curves(rows, guided, ratio)
+        if successes:
+            values['success_plot'] = _plot(
+                lambda width: paper_plots.success_curves(successes, width))
+            values['success_setting'] = tables.setting_title(guided)
     if settings:
-        shares, perturbations = figures.optimum_shares(cells, settings[0], ratio)
+        shares, perturbations = curves.optimum_shares(cells, settings[0], ratio)
         if shares:
             values['share_plot'] = _plot(
                 lambda width: paper_plots.optimum_shares(shares, perturbations, width))
-    targets = figures.target_map(cells, ratio)
+    targets = curves.target_map(cells, ratio)
     if targets is not None:
         values['map_plot'] = _plot(lambda width: paper_plots.heat_map(
             targets.attacks, targets.targets, targets.declines, width))
@@ -135,7 +137,7 @@ def _blocks(tables: Sequence[DeclineTable]) -> list[dict[str, Any]]:
         plot = None if table.ranking is None else _plot(
             partial(paper_plots.critical_difference, table.ranking),
             _BESIDE if beside else plots.WIDE)
-        blocks.append({'table': table, 'verdict': words.verdict(table), 'plot': plot,
+        blocks.append({'table': table, 'verdict': verdicts.verdict(table), 'plot': plot,
                        'beside': beside})
     return blocks
 
@@ -180,7 +182,7 @@ def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, s
     rows: dict[str, list[dict[str, str]]] = {}
     left = list(methods)
     while left:
-        target = words.main_target(left)
+        target = verdicts.main_target(left)
         there = [method for method in left if method['target'] == target]
         left = [method for method in left if method['target'] != target]
         rows[str(target)] = [

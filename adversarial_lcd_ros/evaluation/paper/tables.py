@@ -1,169 +1,236 @@
 """
-The figures printed in "Attacking the Loop", as data, and what their own arithmetic gives.
+Which tables the cells of an evaluation fill: those of the paper, and the attacks side by side.
 
-Transcribed from the LaTeX source of the paper (Kim, Urschler, Riddle, Wicker: "Attacking the
-Loop: Adversarial Attacks on Graph-based Loop Closure Detection"); ``label`` is the label of the
-table there. Declines are percentage points of accuracy as printed: negative.
+A table compares what differs in one respect only. All else (target, oracle, mode, size of graph,
+allowed flips, queries an edit) is its setting, and each setting has a table of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 
-import numpy as np
+from adversarial_lcd_ros.config import TARGETS
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.paper.printed import (
+    BUDGET_TABLE,
+    PERTURBATION_TABLE,
+    SURROGATE_TABLE,
+    PrintedTable,
+)
+from adversarial_lcd_ros.evaluation.paper.ranks import Ranking, rank_methods
+from adversarial_lcd_ros.evaluation.paper.summaries import (
+    ATTACK,
+    OPTIMUM,
+    USUAL,
+    Cell,
+    declines_by_sequence,
+    is_attackable,
+    summarise_methods,
+)
 
-from adversarial_lcd_ros.errors import EvaluationError
+PAPER_RATIO = 3e-4
+PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'
+SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'threshold',
+           'variant')
+# Columns in the order of the paper, then ours, then the yardstick.
+_ORDER = ('svm_linear', 'svm_poly', 'naive_bayes', 'svm_rbf', 'random_flip', 'random_walk',
+          'shortest_path', 'eigencentrality', 'recall', OPTIMUM)
 
-OURS = 'Adv-LCD'  # SVM-RBF with eigencentrality: the paper's proposal
-ALPHA = 0.05
-SEQUENCES = ('fr2-desk', 'fr3-longoffice', 'lounge', 'kitchen', 'garden')
 
-
-@dataclass(frozen=True)
-class PrintedTable:
+@dataclass(frozen=True, eq=False)
+class Line:
     """
-    A table of declines as printed.
+    A row of a table.
 
     Attributes
     ----------
-    number : int
-        Of the table in the paper.
-    label, title : str
-        In the LaTeX source; the printed caption.
-    rows : tuple of str
-        Sequences or perturbation ratios.
-    columns : mapping of str to tuple of float
-        Method to its declines, one a row, percentage points.
-    averages : mapping of str to float
-        The printed last row.
-    digits : mapping of str to int
-        Decimals with which an average is printed, where they are not two.
-    settings : mapping of str to str
-        Method to the value of our setting that stands for it.
+    title : str
+        Sequence or ratio.
+    entries : tuple of (dict or None)
+        A summary a column; None where the evaluation has no such cell.
 
     """
 
-    number: int
-    label: str
     title: str
-    rows: tuple[str, ...]
-    columns: Mapping[str, tuple[float, ...]]
-    averages: Mapping[str, float]
-    settings: Mapping[str, str]
-    digits: Mapping[str, int] = field(default_factory=dict)
+    entries: tuple[Cell | None, ...]
 
-    def mean(self, method: str) -> float:
-        """Return the average that the printed cells of a method give."""
-        return float(np.mean(self.columns[method]))
+    @property
+    def before(self) -> float | None:
+        """Balanced accuracy without an attack, mean over the entries (equal as a rule)."""
+        values = [entry['balanced_clean'] for entry in self.entries
+                  if entry and entry['balanced_clean'] is not None]
+        return sum(values) / len(values) if values else None
 
-    def with_average(self) -> dict[str, tuple[float, ...]]:
-        """Return the columns with the printed average as one more row, as the paper ranked."""
-        return {name: (*cells, self.averages[name]) for name, cells in self.columns.items()}
-
-    def corrected(self, method: str, row: str, value: float) -> PrintedTable:
-        """
-        Return the table with another value in one cell and the average that follows.
-
-        Raises
-        ------
-        EvaluationError
-            There is no such cell.
-
-        """
-        if row not in self.rows or method not in self.columns:
-            raise EvaluationError(f'table {self.number} has no cell {row!r}, {method!r}')
-        cells = tuple(value if name == row else cell
-                      for name, cell in zip(self.rows, self.columns[method], strict=True))
-        mean = round(float(np.mean(cells)), 2)
-        return replace(self, columns={**self.columns, method: cells},
-                       averages={**self.averages, method: mean})
+    @property
+    def strongest(self) -> Cell | None:
+        """The entry with the largest decline, if it is above zero; the yardstick left out."""
+        there = [entry for entry in self.entries if entry and entry['perturbation'] != OPTIMUM
+                 and (entry['decline_pp'] or 0.0) > 0.0]
+        return max(there, key=lambda entry: entry['decline_pp'], default=None)
 
 
-@dataclass(frozen=True)
-class AutorankRow:
-    """A row of the printed Autorank table (Table 4), two decimals cut off, not rounded."""
+@dataclass(frozen=True, eq=False)
+class DeclineTable:
+    """
+    One of the paper's tables, filled with our cells.
 
-    mean_rank: float  # larger is better, unlike Demsar's
-    median: float
-    mad: float
-    interval: tuple[float, float]
-    gamma: float
+    Attributes
+    ----------
+    printed : PrintedTable
+        The paper's.
+    setting : dict
+        ``SETTING`` of all cells in the table.
+    values, columns : tuple of str
+        Our setting that a column stands for, and its heading.
+    lines : tuple of Line
+        By sequence (Tables 3 and 5) or by ratio (Table 6, means over the sequences).
+    mean : Line or None
+        Over the sequences that all columns have, and that allow an edit.
+    ranking : Ranking or None
+        Of the columns but the yardstick; None below two columns or sequences.
 
+    """
 
-@dataclass(frozen=True)
-class Misprint:
-    """A printed figure, and what the printed cells give in its place."""
+    printed: PrintedTable
+    setting: Cell
+    values: tuple[str, ...]
+    columns: tuple[str, ...]
+    lines: tuple[Line, ...]
+    mean: Line | None = None
+    ranking: Ranking | None = None
 
-    table: int
-    what: str
-    printed: float
-    computed: float
-
-
-SURROGATE_TABLE = PrintedTable(
-    3, 'tab:surrogate', 'The decline in LCD accuracy using different surrogate models', SEQUENCES,
-    {'SVM-linear': (-13.29, -14.10, -12.89, -15.67, -13.22),
-     'SVM-poly': (-17.37, -19.72, -19.89, -18.64, -17.89),
-     'Bayesian': (-22.22, -26.94, -26.21, -24.99, -18.46),
-     OURS: (-27.92, -29.33, -28.72, -24.66, -21.69)},
-    {'SVM-linear': -13.83, 'SVM-poly': -18.50, 'Bayesian': -23.76, OURS: -26.46},
-    {'SVM-linear': 'svm_linear', 'SVM-poly': 'svm_poly', 'Bayesian': 'naive_bayes',
-     OURS: 'svm_rbf'})
-PERTURBATION_TABLE = PrintedTable(
-    5, 'tab:ablation', 'The decline in LCD accuracy using different perturbation methods',
-    SEQUENCES,
-    {'Random Walk': (-15.66, -16.72, -17.95, -19.04, -14.55),
-     'Shortest Path': (-24.30, -22.69, -22.46, -24.63, -20.76),
-     'Eigencentrality': (-27.92, -29.33, -28.72, -24.66, -21.69)},
-    {'Random Walk': -16.548, 'Shortest Path': -22.36, 'Eigencentrality': -26.46},
-    {'Random Walk': 'random_walk', 'Shortest Path': 'shortest_path',
-     'Eigencentrality': 'eigencentrality'},
-    {'Random Walk': 3})
-BUDGET_TABLE = PrintedTable(
-    6, 'tab:pert_budget', 'The decline in LCD accuracy at different perturbation budgets '
-    '(fr2-desk)', ('0.0001', '0.0002', '0.0003'),
-    {'Random Walk': (-1.5, -7.33, -15.66), 'Shortest Path': (-3.45, -11.22, -24.30),
-     'Eigencentrality': (-5.02, -16.33, -27.92)},
-    {'Random Walk': -8.16, 'Shortest Path': -12.95, 'Eigencentrality': -16.09},
-    PERTURBATION_TABLE.settings)
-PRINTED_TABLES = (SURROGATE_TABLE, PERTURBATION_TABLE, BUDGET_TABLE)
-
-AUTORANK_TABLE = {  # Table 4, tab:autorank
-    OURS: AutorankRow(3.83, -27.19, 1.83, (-27.9, -26.4), 0.0),
-    'Bayesian': AutorankRow(3.00, -24.37, 1.99, (-24.9, -23.7), -0.9),
-    'SVM-poly': AutorankRow(2.16, -19.41, 0.48, (-19.7, -19.1), -3.9),
-    'SVM-linear': AutorankRow(1.00, -13.56, 0.44, (-13.8, -13.2), -6.8)}
-
-# "surpassing SVM-linear by 12.6%, SVM-polynomial by 7.3%, and Bayesian classifier by 2.7%", and
-# so on (Sec. 4.2 and 4.3): by how much the text says that the paper's method is ahead on average.
-CLAIMED_LEADS = {3: {'SVM-linear': 12.6, 'SVM-poly': 7.3, 'Bayesian': 2.7},
-                 5: {'Random Walk': 9.6, 'Shortest Path': 4.0},
-                 6: {'Random Walk': 7.9, 'Shortest Path': 3.1}}
-
-# One cell that, if printed wrongly, explains the lead in the text and the whole of Table 4.
-# Our inference: the paper does not say so.
-REPAIR = ('SVM-poly', 'garden', -19.89)
+    @property
+    def title(self) -> str:
+        """The setting in words."""
+        return setting_title(self.setting)
 
 
-def repaired_surrogate_table() -> PrintedTable:
-    """Return Table 3 with the cell that explains Table 4 (our inference)."""
-    return SURROGATE_TABLE.corrected(*REPAIR)
+def setting_title(setting: Cell) -> str:
+    """Return what a table holds fixed, in words."""
+    parts = [f'target {setting["target"]}', wording.mode_title(setting['mode']),
+             f'{setting["oracle"]} answers', f'{setting["nodes"]} features']
+    if setting['mode'] == 'query':
+        parts.append(f'{setting["queries_per_edit"]} queries an edit')
+    if setting['edits'] != 'both':
+        parts.append(f'{setting["edits"]} only')
+    if setting['threshold'] != USUAL['threshold']:
+        parts.append(f'threshold {setting["threshold"]:g}')
+    if setting.get('variant'):
+        parts.append(setting['variant'])
+    return ', '.join(parts)
 
 
-def misprints() -> list[Misprint]:
-    """Return the printed averages and leads that do not follow from the printed cells."""
-    found = []
-    for table in PRINTED_TABLES:
-        for method, printed in table.averages.items():
-            computed = table.mean(method)
-            # A half in the last decimal may be rounded either way.
-            if abs(printed - computed) > 0.5 * 10.0 ** -table.digits.get(method, 2) + 1e-9:
-                found.append(Misprint(table.number, f'average of {method}', printed, computed))
-        best = list(table.columns)[-1]
-        for method, claimed in CLAIMED_LEADS[table.number].items():
-            lead = table.mean(method) - table.mean(best)
-            if not claimed <= lead + 1e-9 < claimed + 0.1:  # the text cuts decimals off
-                found.append(Misprint(table.number, f'lead over {method} in the text', claimed,
-                                      lead))
-    return found
+def main_ratio(cells: Sequence[Cell]) -> float:
+    """Return the paper's ratio if there are cells of it, else the largest."""
+    ratios = {float(cell['ratio']) for cell in cells}
+    return PAPER_RATIO if PAPER_RATIO in ratios or not ratios else max(ratios)
+
+
+def surrogate_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+    """Return Tables 3 and 4: surrogates with eigencentrality, a sequence a row."""
+    ratio = main_ratio(cells)
+    chosen = [cell for cell in _native(cells)
+              if cell['ratio'] == ratio and cell['perturbation'] == PAPER_PERTURBATION
+              and cell['surrogate'] != 'none']
+    return _tables(chosen, SURROGATE_TABLE, lambda cell: str(cell['surrogate']))
+
+
+def perturbation_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+    """Return Table 5: perturbations, with SVM-RBF where they use a surrogate."""
+    ratio = main_ratio(cells)
+    chosen = [cell for cell in _perturbations(cells) if cell['ratio'] == ratio]
+    return _tables(chosen, PERTURBATION_TABLE, lambda cell: str(cell['perturbation']))
+
+
+def budget_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+    """Return Table 6: perturbations by ratio, means over the sequences."""
+    tables = []
+    for setting, group in _by_setting(_perturbations(cells)):
+        ratios = sorted({cell['ratio'] for cell in group})
+        if len(ratios) < 2:
+            continue
+        means = {(method['ratio'], method['perturbation']): method
+                 for method in summarise_methods(group)}
+        values = _ordered({perturbation for _, perturbation in means})
+        lines = tuple(Line(f'{ratio:g}', tuple(means.get((ratio, value)) for value in values))
+                      for ratio in ratios)
+        tables.append(DeclineTable(BUDGET_TABLE, setting, values, tuple(map(_heading, values)),
+                                   lines))
+    return tables
+
+
+def _native(cells: Sequence[Cell]) -> list[Cell]:
+    # Attacks that asked the very detector they attack.
+    return [cell for cell in cells
+            if cell['asked_target'] == cell['target'] and cell['mode'] != 'pass']
+
+
+def _perturbations(cells: Sequence[Cell]) -> list[Cell]:
+    # The paper's perturbations come with SVM-RBF; one that has no such cell comes as it is, if
+    # there is only one way.
+    native = _native(cells)
+    ways: dict[tuple[Hashable, ...], set[str]] = {}
+    for cell in native:
+        ways.setdefault(_way(cell), set()).add(cell['surrogate'])
+    preferred = {way: PAPER_SURROGATE if PAPER_SURROGATE in there else
+                 'none' if 'none' in there else min(there) for way, there in ways.items()}
+    return [cell for cell in native if cell['surrogate'] == preferred[_way(cell)]]
+
+
+def _way(cell: Cell) -> tuple[Hashable, ...]:
+    return (cell['perturbation'], *(cell[name] for name in SETTING))
+
+
+def _by_setting(cells: Sequence[Cell]) -> list[tuple[Cell, list[Cell]]]:
+    # The most complete setting first, then the detectors in their usual order.
+    groups: dict[tuple[Hashable, ...], list[Cell]] = {}
+    for cell in cells:
+        groups.setdefault(tuple(cell[name] for name in SETTING), []).append(cell)
+    known = {name: place for place, name in enumerate(TARGETS)}
+    order = sorted(groups, key=lambda key: (-len(groups[key]), known.get(str(key[0]), len(known)),
+                                            str(key)))
+    return [(dict(zip(SETTING, key, strict=True)), groups[key]) for key in order]
+
+
+def _tables(cells: Sequence[Cell], printed: PrintedTable,
+            column: Callable[[Cell], str]) -> list[DeclineTable]:
+    tables = []
+    for setting, group in _by_setting(cells):
+        values = _ordered({column(cell) for cell in group})
+        if sum(value != OPTIMUM for value in values) < 2:
+            continue  # one column compares nothing
+        at = {(cell['sequence'], column(cell)): cell for cell in group}
+        sequences = sorted({cell['sequence'] for cell in group})
+        lines = tuple(Line(sequence, tuple(at.get((sequence, value)) for value in values))
+                      for sequence in sequences)
+        whole = [line.title for line in lines
+                 if all(entry and is_attackable(entry) for entry in line.entries)]
+        means = {column(method): method for method in summarise_methods(
+            [cell for cell in group if cell['sequence'] in whole])}
+        mean = (Line('mean', tuple(means[value] for value in values)) if whole else None)
+        tables.append(DeclineTable(printed, setting, values, tuple(map(_heading, values)), lines,
+                                   mean, _ranking(group, column)))
+    return tables
+
+
+def _ranking(cells: Sequence[Cell], column: Callable[[Cell], str]) -> Ranking | None:
+    names = {tuple(cell[factor] for factor in ATTACK): _heading(column(cell)) for cell in cells
+             if cell['perturbation'] != OPTIMUM}
+    declines = declines_by_sequence(cells, names)
+    if len(declines) < 2 or min(map(len, declines.values())) < 2:
+        return None
+    return rank_methods(declines)
+
+
+def _ordered(values: set[str]) -> tuple[str, ...]:
+    known = {name: place for place, name in enumerate(_ORDER)}
+    # What is new comes before ours and the yardstick.
+    middle = known['recall'] - 0.5
+    return tuple(sorted(values, key=lambda value: (known.get(value, middle), value)))
+
+
+def _heading(value: str) -> str:
+    if value == OPTIMUM:
+        return 'optimum (yardstick)'
+    return wording.surrogate_title(value)

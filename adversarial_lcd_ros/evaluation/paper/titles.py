@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.statistics import OPTIMUM, Cell
+from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM, Cell
 
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
           'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}',

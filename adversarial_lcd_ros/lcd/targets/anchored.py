@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.hamming import compiled
+from adversarial_lcd_ros.compiled.hamming import compiled
 from adversarial_lcd_ros.lcd.targets.base import Scores
 from adversarial_lcd_ros.lcd.targets.scores import assign_objects
 from adversarial_lcd_ros.lcd.views import Comparison, NodeMatch, View

@@ -9,8 +9,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.incidence import LENGTH_SCALE
 from adversarial_lcd_ros.lcd.targets.scores import share
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path

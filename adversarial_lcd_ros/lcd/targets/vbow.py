@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.keyframes import bow_score
+from adversarial_lcd_ros.keyframes.database import bow_score
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import OBJECT_TIER
 from adversarial_lcd_ros.lcd.views import Comparison, View
-from adversarial_lcd_ros.wl_histogram import Histogram, histogram
+from adversarial_lcd_ros.weisfeiler_lehman.histogram import Histogram, histogram
 
 # The least depth at which edges count at all, and the best of 0 to 3 across the training sequences
 # (docs/target.md): each further one adds labels that recur in no other view.

@@ -1,0 +1,199 @@
+"""
+What a detector is worth before any attack: every target, on pairs and live.
+
+Pairs are the paper's "accuracy": as many loops as other places, judged one by one. Live, every
+frame of a replay is judged against the keyframes before it, retrieval by words included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.frames.cells import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.metrics import (
+    Metrics,
+    first_closure_latency_s,
+    measure,
+    outcomes,
+    right,
+)
+from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
+from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
+from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.targets import Target, make_target
+from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.training.model_folder import trained_on
+from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
+
+SCHEMA = 2
+PROTOCOLS = ('pairs', 'live')
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class TargetTask:
+    """
+    A target on a sequence by one protocol.
+
+    Attributes
+    ----------
+    stream : Stream
+    target : str
+    protocol : str
+        'pairs' or 'live'.
+    lcd : LcdConfig
+        Of the detector, but for its target.
+    pairs : int
+        Most loops, and as many pairs of different places, of a draw.
+    seeds : tuple of int
+        One draw of pairs each.
+    scored : (float, float)
+        From and to which fraction of the frames queries are scored; the others are map only.
+    label_config : LabelConfig
+        What the stream was labelled with.
+
+    """
+
+    stream: Stream
+    target: str
+    protocol: str
+    lcd: LcdConfig
+    pairs: int
+    seeds: tuple[int, ...]
+    scored: tuple[float, float] = (0.0, 1.0)
+    label_config: LabelConfig = LabelConfig()
+
+    @property
+    def key(self) -> str:
+        """Digest of all that the figures depend on, hexadecimal."""
+        values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
+                  'detector': {**asdict(self.lcd), 'target': self.target},
+                  'models': [file_digest(path) for path in
+                             (self.model, self.model.with_suffix('.onnx')) if path.exists()],
+                  'seeds': self.seeds,
+                  'scored': self.scored, 'labels': asdict(self.label_config)}
+        if self.protocol == 'pairs':
+            # The stream's digest is of what a replay needs, and knows nothing of pairs.
+            values |= {'pairs': self.pairs,
+                       'relation': digest_of(self.labels().relation.tobytes())}
+        return digest_of(json.dumps(values, sort_keys=True).encode())
+
+    @property
+    def model(self) -> Path:
+        """File of the trained decision."""
+        return target_path(self.lcd.model, self.target)
+
+    def decision(self) -> Decision:
+        """Return the trained decision of the target."""
+        target = self.make_target()
+        return Decision.load(self.model, target.name, target.channels)
+
+    def make_target(self) -> Target:
+        """Return the target; one with a network takes that beside its decision."""
+        return make_target(self.target, self.model.with_suffix('.onnx'))
+
+    def labels(self) -> FrameLabels:
+        """Return the labels, without queries outside the part that is scored."""
+        labels = self.stream.labels
+        frames = len(labels.kind)
+        outside = np.ones(frames, bool)
+        outside[int(frames * self.scored[0]):int(frames * self.scored[1])] = False
+        relation = np.tril(labels.relation, -1)
+        relation[outside] = 0
+        return replace(labels, relation=relation,
+                       kind=np.where(outside, 0, labels.kind).astype(np.int8))
+
+
+def run_target(task: TargetTask) -> tuple[str, Row]:
+    """
+    Return the key of a task and its row.
+
+    The row has ``sequence, target, protocol, nodes, nodes_mean, frames, scored, trained_on,
+    references_trained_on, geometric_check, labels, positives, negatives, balanced_accuracy,
+    ci95, average_precision, recall_at_100_precision, mcc, precision, recall``, and ``n_pairs,
+    distinct_pairs, seeds`` or ``n_frames, wrong_matches, latency_to_first_closure_s``; labels
+    are settings. Pairs are judged without the geometric check. Undefined figures are None, so
+    all of a sequence without pairs of a class.
+    """
+    figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
+    stream = task.stream
+    return task.key, {
+        'sequence': stream.name, 'target': task.target, 'protocol': task.protocol,
+        'nodes': stream.nodes, 'nodes_mean': stream.nodes_mean,
+        'frames': len(stream.labels.kind), 'scored': list(task.scored),
+        'trained_on': trained_on(task.model, stream.graphs.source, task.scored),
+        'references_trained_on': trained_on(task.model, stream.graphs.source,
+                                            (0.0, task.scored[1])),
+        'geometric_check': task.protocol == 'live' and task.lcd.geometric_check,
+        'labels': asdict(task.label_config), **figures}
+
+
+def _pairs(task: TargetTask) -> Row:
+    labels, decision = task.labels(), task.decision()
+    graphs = load_stream_graphs(task.stream.graphs)
+    count = min(task.pairs, *(int((labels.relation == value).sum())
+                              for value in (POSITIVE, NEGATIVE)))
+    if not count:
+        return {**_figures(None), 'n_pairs': 0, 'distinct_pairs': 0, 'seeds': 0, 'ci95': None}
+    scorer = PairScorer(task.make_target(), graphs, task.lcd.map_window)
+    draws = [sample_pairs(labels.relation, np.random.default_rng(seed), count)
+             for seed in task.seeds]
+    query, reference, is_loop = (np.concatenate([getattr(draw, name) for draw in draws])
+                                 for name in ('query', 'reference', 'is_loop'))
+    logit = decision.logit(scorer.pairs(LabelledPairs(graphs, query, reference, is_loop)))
+    kind = np.where(is_loop, POSITIVE, NEGATIVE).astype(np.int8)
+    probability = 1 / (1 + np.exp(-logit))
+    declared = probability >= task.lcd.threshold
+    metrics = measure(kind, declared, probability, np.ones(len(kind), bool))
+    return {**_figures(metrics), 'n_pairs': len(kind), 'seeds': len(task.seeds),
+            'distinct_pairs': np.unique([query, reference], axis=1).shape[1],
+            'ci95': _pair_interval(labels, query, kind, declared == is_loop)}
+
+
+def _pair_interval(labels: FrameLabels, query: NDArray[np.int64], kind: NDArray[np.int8],
+                   correct: NDArray[np.bool_]) -> list[float] | None:
+    """Return the interval over blocks of query frames: pairs of one frame are near copies."""
+    size = np.zeros((2, len(labels.kind)), np.int64)
+    total = np.zeros_like(size)
+    row = (kind == NEGATIVE).astype(np.int64)
+    np.add.at(size, (row, query), 1)
+    np.add.at(total, (row, query), correct)
+    interval = intervals.class_mean_interval(
+        size, total, intervals.block_frames(labels.stamp_ns), seed=0)
+    return list(interval) if interval else None
+
+
+def _live(task: TargetTask) -> Row:
+    labels = task.labels()
+    run, _ = run_offline(load_stream_graphs(task.stream.graphs),
+                         replace(task.lcd, target=task.target))
+    frame_of = {int(stamp): frame for frame, stamp in enumerate(labels.stamp_ns)}
+    match = np.array([NO_MATCH if decision.match_stamp_ns is None
+                      else frame_of[decision.match_stamp_ns] for decision in run.decisions])
+    correct = labels.is_correct(np.arange(len(match)), match)
+    is_loop = np.array([decision.is_loop for decision in run.decisions])
+    probability = np.array([decision.probability for decision in run.decisions])
+    metrics = measure(labels.kind, is_loop, probability, correct)
+    outcome = outcomes(labels.kind, is_loop, correct)
+    interval = intervals.balanced_accuracy_interval(
+        labels.kind, right(outcome), intervals.block_frames(labels.stamp_ns), seed=0)
+    return {**_figures(metrics), 'n_frames': len(match), 'wrong_matches': metrics.wrong_matches,
+            'ci95': list(interval) if interval else None,
+            'latency_to_first_closure_s': first_closure_latency_s(
+                labels.stamp_ns, labels.kind, outcome)}
+
+
+def _figures(metrics: Metrics | None) -> Row:
+    return {name: getattr(metrics, name, None) for name in (
+        'positives', 'negatives', 'balanced_accuracy', 'average_precision',
+        'recall_at_100_precision', 'mcc', 'precision', 'recall')}

@@ -1,0 +1,256 @@
+"""
+Attacks on single frames of a stream: the protocol of the paper's experiments.
+
+The stream is walked in order. The detector remembers every clean graph and the attacker sees
+each go by, but only a sample of the frames is attacked and judged, each against the map of clean
+graphs before it. In a live run (``live``, ``offline``) every frame is attacked and the map
+consists of attacked graphs; here frames do not hang on each other, and attacks with a thousand
+queries a frame can be compared over many seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+import time
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
+from adversarial_lcd_ros.attack.oracle import Ask
+from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, FrameLabels
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+
+_DRAW = 20_210  # of the one drawing that all seeds share
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSample:
+    """
+    The frames to attack, and what ground truth says about them.
+
+    Attributes
+    ----------
+    frame : int64, (k,)
+        Indices in the stream, ascending.
+    kind : int8, (k,)
+        +1 a loop is there to be found, -1 a new place.
+    right : bool, (k, n)
+        Frames of the stream that a match may name.
+
+    """
+
+    frame: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    right: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """
+    One attacked frame.
+
+    Attributes
+    ----------
+    kind : int
+        +1 a loop is there to be found, -1 a new place.
+    clean, attacked : LoopClosure
+        Decisions on the clean and on the forwarded graph.
+    clean_right, attacked_right : bool
+        Whether the match named is right, declared or not.
+    result : AttackResult
+    query_s, search_s, judge_s : float
+        Processor time spent in the asked detector, in the rest of the attack, and on judging
+        its outcome: what else the machine does is no matter.
+
+    """
+
+    kind: int
+    clean: LoopClosure
+    attacked: LoopClosure
+    clean_right: bool
+    attacked_right: bool
+    result: AttackResult
+    query_s: float
+    search_s: float
+    judge_s: float
+
+
+class _Adversary(Protocol):
+    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult: ...
+
+    def observe(self, graph: MultiTierGraph) -> None: ...
+
+
+@dataclass
+class _Yardstick:
+    """The optimum in an attacker's place: it looks into the detector instead of asking."""
+
+    optimum: Optimum
+
+    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
+        return self.optimum.process(graph)
+
+    def observe(self, graph: MultiTierGraph) -> None:
+        """Remember nothing."""
+
+
+@dataclass
+class _Timed:
+    """A detector that answers queries, counted and timed."""
+
+    detector: LoopClosureDetector
+    count: int = 0
+    spent_s: float = 0.0
+
+    def __call__(self, graph: MultiTierGraph) -> LcdAnswer:
+        started = time.thread_time()
+        answer = self.detector.answer(LcdQuery(0, graph))
+        self.spent_s += time.thread_time() - started
+        self.count += 1
+        return answer
+
+
+@dataclass
+class _Contest:
+    """A cell's attacker, and the detectors that it asks and that judge it."""
+
+    adversary: _Adversary
+    asked: LoopClosureDetector
+    judging: LoopClosureDetector
+    results: list[FrameResult] = field(default_factory=list)
+
+
+def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
+    """
+    Draw frames with a loop, and as many at new places.
+
+    The frames of each kind are cut in time into ``per_kind`` parts, and one of each part is
+    drawn. Seeds that follow each other draw different frames, until a part is used up and begins
+    anew: then its frames are attacked again, with other random numbers. A kind with fewer frames
+    than asked for gives all it has, and one without any gives none.
+
+    Parameters
+    ----------
+    labels : FrameLabels
+        Of the stream.
+    per_kind : int
+        Frames of each kind.
+    seed : int
+        Of the cell.
+
+    """
+    chosen = []
+    for kind in (POSITIVE, NEGATIVE):
+        frames = np.flatnonzero(labels.kind == kind)
+        for part in np.array_split(frames, min(per_kind, len(frames)) or 1):
+            if len(part):
+                order = np.random.default_rng((_DRAW, int(part[0]))).permutation(part)
+                chosen.append(int(order[seed % len(part)]))
+    frame = np.array(sorted(chosen), np.int64)
+    every = np.arange(len(labels.kind))
+    right = np.array([labels.is_correct(np.full(len(every), query), every) for query in frame],
+                     bool).reshape(len(frame), len(every))
+    return FrameSample(frame, labels.kind[frame], right)
+
+
+def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],
+                  lcd: LcdConfig, seed: int) -> list[list[FrameResult]]:
+    """
+    Walk a stream once for several cells; return for each its attacked frames.
+
+    Cells do not see each other: results are the same as one by one. What does not depend on
+    flips is computed once a frame for all that ask the same detector.
+
+    Parameters
+    ----------
+    graphs : sequence of MultiTierGraph
+        Clean graphs in order of time.
+    sample : FrameSample
+        The frames to attack.
+    cells : sequence of Cell
+    lcd : LcdConfig
+        Of the detectors, but for what the cells say.
+    seed : int
+        Of the attackers.
+
+    Raises
+    ------
+    EvaluationError
+        An attack overspent a budget.
+
+    """
+    detectors: dict[LcdConfig, LoopClosureDetector] = {}
+    contests = [_contest(cell, lcd, seed, detectors) for cell in cells]
+    place = {int(frame): row for row, frame in enumerate(sample.frame)}
+    index_of = {graph.stamp_ns: index for index, graph in enumerate(graphs)}
+    for index, graph in enumerate(graphs[:max(place, default=-1) + 1]):
+        if index in place:
+            row = place[index]
+            # What flips leave alone is computed here, at the cost of no cell.
+            clean = {config: detector.judge(graph) for config, detector in detectors.items()}
+            for contest in contests:
+                contest.results.append(_attack_frame(
+                    contest, graph, clean[contest.judging.config], int(sample.kind[row]),
+                    sample.right[row], index_of))
+        for detector in detectors.values():
+            detector.remember(graph)
+        for contest in contests:
+            contest.adversary.observe(graph)
+    return [contest.results for contest in contests]
+
+
+def _contest(cell: Cell, lcd: LcdConfig, seed: int,
+             detectors: dict[LcdConfig, LoopClosureDetector]) -> _Contest:
+    lcd = replace(lcd, threshold=cell.threshold)
+    judging = _detector(replace(lcd, target=cell.target, hard_answers=False), detectors)
+    asked = _detector(replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'),
+                      detectors)
+    attack = replace(cell.attack, seed=seed)
+    adversary: _Adversary = (_Yardstick(Optimum(judging, attack))
+                             if cell.perturbation == Optimum.name else Attacker(attack))
+    return _Contest(adversary, asked, judging)
+
+
+def _detector(config: LcdConfig,
+              detectors: dict[LcdConfig, LoopClosureDetector]) -> LoopClosureDetector:
+    if config not in detectors:
+        detectors[config] = LoopClosureDetector(config)
+    return detectors[config]
+
+
+def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, kind: int,
+                  right: NDArray[np.bool_], index_of: dict[int, int]) -> FrameResult:
+    ask = _Timed(contest.asked)
+    begun = time.thread_time()
+    result = contest.adversary.attack(graph, ask)
+    attacked = time.thread_time()
+    after = contest.judging.judge(result.perturbed)
+    _check_budgets(result, ask.count)
+    return FrameResult(
+        kind, clean, after, _is_right(clean, right, index_of), _is_right(after, right, index_of),
+        result, ask.spent_s, attacked - begun - ask.spent_s, time.thread_time() - attacked)
+
+
+def _is_right(decision: LoopClosure, right: NDArray[np.bool_], index_of: dict[int, int]) -> bool:
+    return (decision.match_stamp_ns is not None
+            and bool(right[index_of[decision.match_stamp_ns]]))
+
+
+def _check_budgets(result: AttackResult, queries: int) -> None:
+    # Counted here once more, on the graphs and at the detector: a figure of an attack that
+    # overspends is a figure of another attack.
+    edits = len(result.flips)
+    if edits > result.edit_budget or queries != result.queries or queries > result.query_budget:
+        raise EvaluationError(
+            f'frame at {result.clean.stamp_ns} ns: {edits} edits of {result.edit_budget}, '
+            f'{queries} queries of {result.query_budget} ({result.queries} reported): the attack '
+            'does not keep to its budgets')

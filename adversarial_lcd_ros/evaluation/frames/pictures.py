@@ -1,0 +1,142 @@
+"""Pictures of a sweep: the frames that the strongest attack turned over, attacked once more."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+import logging
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.frames.attacked import (
+    FrameResult,
+    attack_frames,
+    sample_frames,
+)
+from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import holds_graphs
+from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.training.sources import TrainingSource
+from adversarial_lcd_ros.vision.draw import draw_attack
+
+PICTURES = 6
+_BLANK_GREY = 235
+# Of outcomes clean and attacked; they take turns.
+_TELLING = {('TP', 'FN'): 'suppressed', ('TN', 'FP'): 'invented', ('TP', 'WM'): 'diverted'}
+
+_log = logging.getLogger(__name__)
+Row = dict[str, Any]
+# A row, and one of its frames.
+_Chosen = tuple[Row, dict[str, Any]]
+
+
+def sweep_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Sequence[Row],
+                   lcd: LcdConfig, count: int = PICTURES) -> list[Picture]:
+    """
+    Return query, match and attacked graph of frames that the strongest attack turned over.
+
+    Only attacks that ask the detector they attack; the yardstick is none. Kinds of effect and
+    sequences take turns. Attacks are repeatable: each chosen cell is run once more. A frame that
+    comes out differently than its row says gets no picture, and a warning.
+
+    Parameters
+    ----------
+    streams, cells, lcd
+        Of the sweep.
+    rows : sequence of dict
+        Of the sweep.
+    count : int
+        Most pictures.
+
+    """
+    stream_of = {(stream.name, stream.nodes): stream for stream in streams}
+    cell_of = {repr(cell.settings): cell for cell in cells}
+    attacks: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        attacks[repr({name: row[name] for name in cells[0].settings})].append(row)
+    strongest = _strongest(attacks)
+    pictures = []
+    for row, frame in _choose(attacks.get(strongest, ()), count):
+        stream = stream_of[row['sequence'], row['nodes']]
+        result = _again(stream, cell_of[strongest], row, frame, lcd)
+        if result is not None:
+            pictures.append(_picture(stream, row, frame, result))
+    return pictures
+
+
+def _strongest(attacks: Mapping[str, Sequence[Row]]) -> str:
+    """Return the attack that turned most frames over; '' if none turned any."""
+    turned = {name: sum(row['suppressed'] + row['invented'] for row in rows)
+              for name, rows in attacks.items()
+              if rows[0]['perturbation'] != Optimum.name
+              and rows[0]['asked_target'] == rows[0]['target']}
+    best = max(turned, key=lambda name: turned[name], default='')
+    return best if turned.get(best) else ''
+
+
+def _choose(rows: Sequence[Row], count: int) -> list[_Chosen]:
+    waiting: dict[tuple[str, str], list[_Chosen]] = defaultdict(list)
+    for effect in _TELLING.values():
+        for row in rows:
+            found = [(row, frame) for frame in row['frame_results']
+                     if _TELLING.get((frame['clean'], frame['attacked'])) == effect]
+            waiting[effect, row['sequence']] += found
+    return list(_in_turns([group for group in waiting.values() if group], count))
+
+
+def _in_turns(groups: list[list[_Chosen]], count: int) -> Iterator[_Chosen]:
+    taken: set[tuple[str, int]] = set()
+    while count and any(groups):
+        for group in groups:
+            # Seeds may attack a frame again: one picture of it is enough.
+            while group and (group[0][0]['sequence'], group[0][1]['stamp']) in taken:
+                group.pop(0)
+            if group and count:
+                row, frame = group.pop(0)
+                taken.add((row['sequence'], frame['stamp']))
+                count -= 1
+                yield row, frame
+
+
+def _again(stream: Stream, cell: Cell, row: Row, frame: dict[str, Any],
+           lcd: LcdConfig) -> FrameResult | None:
+    sample = sample_frames(stream.labels, cell.frames, row['seed'])
+    results, = attack_frames(load_stream_graphs(stream.graphs), sample, [cell], lcd, row['seed'])
+    found = next(result for result in results if result.result.clean.stamp_ns == frame['stamp'])
+    if (len(found.result.flips), found.result.queries) != (frame['edits'], frame['queries']):
+        _log.warning('%s: the frame at %d ns took %d queries and now takes %d; no picture of it',
+                     row['sequence'], frame['stamp'], frame['queries'], found.result.queries)
+        return None
+    return found
+
+
+def _picture(stream: Stream, row: Row, frame: dict[str, Any], found: FrameResult) -> Picture:
+    effect = _TELLING[frame['clean'], frame['attacked']]
+    graphs = load_stream_graphs(stream.graphs)
+    stamp = (found.clean if effect == 'suppressed' else found.attacked).match_stamp_ns
+    match = next(graph for graph in graphs if graph.stamp_ns == stamp)
+    clean = found.result.clean
+    caption = (f'Probability {found.clean.probability:.2f} clean, '
+               f'{found.attacked.probability:.2f} attacked; {frame["edits"]} edges flipped of '
+               f'{frame["edit_budget"]} allowed, {frame["queries"]} queries; target '
+               f'{row["target"]}.')
+    return Picture(
+        f'{row["sequence"]}, frame {clean.sequence}: {effect} by {wording.attack_title(row)}',
+        caption, draw_attack(_image(stream, clean), clean, _image(stream, match), match,
+                             found.result.perturbed))
+
+
+def _image(stream: Stream, graph: MultiTierGraph) -> NDArray[np.uint8]:
+    path = TrainingSource.parse(stream.graphs.source).path
+    if stream.graphs.builder.detector == 'csv' or holds_graphs(path):
+        return np.full((graph.height, graph.width, 3), _BLANK_GREY, np.uint8)
+    frames = open_sequence(path).frames(graph.sequence, graph.sequence + 1)
+    return np.asarray(next(iter(frames)).image(), np.uint8)

@@ -1,0 +1,156 @@
+"""
+Recipes of evaluations by frames: attacks with their defaults, and axes that are multiplied out.
+
+    protocol: frames
+    seeds: 10
+    frames: 6
+    defaults: {target: wl, nodes: 300}
+    attacks:
+      - surrogate: [svm_rbf, svm_linear]
+        ratio: [1e-4, 3e-4]
+
+A setting with a list is an axis: this recipe has four attacks. Beside the settings of the
+attacker an attack has those of ``CellConfig``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from pathlib import Path
+from typing import Any, ClassVar
+
+from adversarial_lcd_ros.config import (
+    TARGETS,
+    AttackConfig,
+    BuilderConfig,
+    Config,
+    LcdConfig,
+    setting,
+)
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
+from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+
+_FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
+_TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
+
+
+@dataclass(frozen=True)
+class CellConfig(Config):
+    """What an attack of a recipe has beside the settings of the attacker."""
+
+    title: ClassVar[str] = 'recipe'
+
+    name: str = setting('', 'What tables call the attack; empty: by its settings.')
+    target: str = setting('wl', 'The detector that is attacked.', choices=TARGETS)
+    asked_target: str = setting(
+        '', 'Transfer: the detector that answers queries; empty: the one attacked.',
+        choices=('', *TARGETS))
+    oracle: str = setting(
+        'soft', 'soft: answers with probabilities; hard: decisions only.', choices=ORACLES)
+    threshold: float = setting(
+        LcdConfig.threshold, 'Probability from which on the detectors declare a loop.', low=0.0,
+        high=1.0)
+    nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
+    frames: int = setting(
+        6, 'Frames with a loop, and as many at new places, for each seed.', low=1, high=100_000)
+    seeds: int = setting(10, 'Seeds.', low=1, high=100_000)
+
+
+def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
+    """
+    Return the cells of a recipe in its order, each once.
+
+    Parameters
+    ----------
+    name : str
+        A recipe that ships, or the path of a YAML file like config/recipes/paper.yaml.
+    overrides : mapping
+        Settings that win over those of every attack in the recipe. Of attacks that become equal
+        by them the first counts.
+
+    Raises
+    ------
+    ConfigError
+        There is no such recipe, or it is not of the expected form.
+
+    """
+    path, content = read_recipe(name)
+    if content['protocol'] != FRAMES:
+        raise ConfigError(f'recipe {path} is of the protocol "{content["protocol"]}": expected '
+                          f'"{FRAMES}"')
+    _check_names(path, 'the recipe', content, _TOP)
+    general: dict[str, Any] = {key: content[key] for key in ('seeds', 'frames')
+                               if key in content}
+    defaults = content.get('defaults') or {}
+    cells: dict[str, Cell] = {}
+    for entry in content['attacks']:
+        for values in _multiplied(path, {**general, **_mapping(path, 'defaults', defaults),
+                                         **_mapping(path, 'an attack', entry), **overrides}):
+            cell = _cell(path, values)
+            known = cells.setdefault(repr(cell.settings), cell)
+            if not overrides and (known.frames, known.seeds) != (cell.frames, cell.seeds):
+                raise ConfigError(f'recipe {path}: {cell.settings} is there twice, with other '
+                                  'numbers of frames or seeds: expected it once')
+    return list(cells.values())
+
+
+def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:
+    if not isinstance(values, dict):
+        raise ConfigError(f'recipe {path}, {what}: expected NAME: VALUE, found {values!r}')
+    known = [entry.name for config in (CellConfig, AttackConfig) for entry in fields(config)
+             if entry.name != 'seed']
+    _check_names(path, what, values, known)
+    return values
+
+
+def _check_names(path: Path, what: str, values: Mapping[str, Any],
+                 known: tuple[str, ...] | list[str]) -> None:
+    unknown = sorted(str(name) for name in values if name not in known)
+    if unknown:
+        raise ConfigError(f'recipe {path}, {what}: unknown {", ".join(unknown)}; there are: '
+                          f'{", ".join(known)}')
+
+
+def _multiplied(path: Path, values: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    axes = {name: value if isinstance(value, list) else [value]
+            for name, value in values.items()}
+    empty = [name for name, axis in axes.items() if not axis]
+    if empty:
+        raise ConfigError(f'recipe {path}: {", ".join(empty)} is an empty list: expected values')
+    for choice in product(*axes.values()):
+        yield dict(zip(axes, choice, strict=True))
+
+
+def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
+    own_names = {entry.name for entry in fields(CellConfig)}
+    attack = {name: _number(value) if name in _FLOATS else value
+              for name, value in values.items() if name not in own_names}
+    perturbation = attack.get('perturbation', AttackConfig.perturbation)
+    unused: tuple[str, ...] = ()
+    if perturbation == Optimum.name:
+        # It asks nobody and learns nothing: all else would tell equal cells apart.
+        attack = {'surrogate': 'none', **{name: attack[name] for name in ('ratio', 'edits')
+                                          if name in attack}}
+        unused = ('oracle', 'asked_target')
+    try:
+        own = CellConfig.from_mapping({name: value for name, value in values.items()
+                                       if name in own_names and name not in unused})
+        config = AttackConfig.from_mapping(attack)
+    except ConfigError as error:
+        raise ConfigError(f'recipe {path}: {error}') from error
+    known = asdict(own)
+    return Cell(perturbation, config, **{**known, 'asked_target': own.asked_target or own.target})
+
+
+def _number(value: Any) -> Any:
+    # YAML 1.1 takes 1e-4, without a point, for text.
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            return value
+    return value

@@ -1,0 +1,132 @@
+"""
+How sure a figure is: intervals that respect that neighbouring frames are near copies.
+
+Frames of a video are not independent, so the bootstrap resamples blocks of consecutive frames:
+the circular block bootstrap of Politis and Romano (1992), percentile intervals. Both runs are
+taken over the same blocks, so the interval of a decline is that of the paired difference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
+
+BLOCK_S = 2.0
+REPLICATES = 4000
+LEVEL = 0.95
+Interval = tuple[float, float]
+
+
+def block_frames(stamp_ns: NDArray[np.int64], block_s: float = BLOCK_S) -> int:
+    """
+    Return the number of frames in a block of ``block_s`` seconds, at least 1.
+
+    Raises
+    ------
+    EvaluationError
+        There are fewer than two frames.
+
+    """
+    if len(stamp_ns) < 2:
+        raise EvaluationError(f'{len(stamp_ns)} frames: an interval needs at least 2')
+    period_s = float(np.median(np.diff(stamp_ns))) * 1e-9
+    return min(max(1, round(block_s / period_s)), len(stamp_ns))
+
+
+def balanced_accuracy_interval(kind: NDArray[np.int8], right: NDArray[np.bool_], block: int,
+                               seed: int, replicates: int = REPLICATES,
+                               level: float = LEVEL) -> Interval | None:
+    """
+    Return the interval of the balanced accuracy, 0 to 1; None if a class is empty.
+
+    Parameters
+    ----------
+    kind : int8, (n,)
+        +1, -1, or 0 (not scored) of every frame, in time order without gaps.
+    right : bool, (n,)
+        The decision was right.
+    block : int
+        Consecutive frames that are resampled together.
+    seed, replicates, level
+        Of the bootstrap.
+
+    """
+    return _interval(kind, right.astype(np.int64), block, seed, replicates, level)
+
+
+def decline_interval(kind: NDArray[np.int8], right_before: NDArray[np.bool_],
+                     right_after: NDArray[np.bool_], block: int, seed: int,
+                     replicates: int = REPLICATES, level: float = LEVEL) -> Interval | None:
+    """
+    Return the interval of the decline in balanced accuracy, percentage points.
+
+    Parameters are those of ``balanced_accuracy_interval``; None if a class is empty.
+
+    """
+    lost = right_before.astype(np.int64) - right_after.astype(np.int64)
+    interval = _interval(kind, lost, block, seed, replicates, level)
+    return None if interval is None else (100.0 * interval[0], 100.0 * interval[1])
+
+
+def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> Interval | None:
+    """
+    Return Wilson's interval of a proportion; None without trials.
+
+    For independent trials only, such as pairs far apart; it is too narrow for video frames.
+
+    """
+    if trials == 0:
+        return None
+    interval = binomtest(successes, trials).proportion_ci(level, method='wilson')
+    return float(interval.low), float(interval.high)
+
+
+def class_mean_interval(size: NDArray[np.int64], total: NDArray[np.int64], block: int, seed: int,
+                        replicates: int = REPLICATES, level: float = LEVEL) -> Interval | None:
+    """
+    Return the interval of the mean over two classes of the mean value in each.
+
+    Parameters
+    ----------
+    size, total : int64, (2, n)
+        How many values of each class a frame has (several where runs are repeated, none where
+        it is not scored), and their sum.
+    block, seed, replicates, level
+        As for ``balanced_accuracy_interval``; None if a class is empty.
+
+    """
+    count = size.shape[1]
+    if not 1 <= block <= count:
+        raise EvaluationError(f'blocks of {block} frames in {count}: expected 1 to {count}')
+    if not np.all(size.sum(axis=1)):
+        return None
+    start = np.random.default_rng(seed).integers(
+        count, size=(replicates, -(-count // block)), dtype=np.int32)
+    means = []
+    for sizes, totals in zip(size, total, strict=True):
+        drawn = _block_sums(sizes, block)[start].sum(axis=1)
+        value = _block_sums(totals, block)[start].sum(axis=1)
+        means.append(np.divide(value, drawn, out=np.full(replicates, np.nan), where=drawn > 0))
+    # A replicate that missed a class altogether has no balanced accuracy.
+    estimate = (means[0] + means[1]) / 2
+    tail = (1.0 - level) / 2
+    low, high = np.nanquantile(estimate, [tail, 1.0 - tail])
+    return float(low), float(high)
+
+
+def _interval(kind: NDArray[np.int8], value: NDArray[np.int64], block: int, seed: int,
+              replicates: int, level: float) -> Interval | None:
+    member = np.stack([kind == POSITIVE, kind == NEGATIVE])
+    return class_mean_interval(member.astype(np.int64), np.where(member, value, 0), block, seed,
+                               replicates, level)
+
+
+def _block_sums(value: NDArray[np.int64], block: int) -> NDArray[np.int64]:
+    # Sum of each circular block, by its first frame.
+    running = np.concatenate([[0], np.cumsum(np.concatenate([value, value[:block - 1]]))])
+    sums: NDArray[np.int64] = running[block:] - running[:len(value)]
+    return sums

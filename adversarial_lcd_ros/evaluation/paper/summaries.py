@@ -1,0 +1,277 @@
+"""
+Cells of the paper's experiments, summarised: repeats averaged, the sequence as the unit.
+
+A cell is one attack on one sequence with one seed. Seeds are repeats of a measurement, not
+further evidence: they are averaged within the sequence. The interval of a sequence is the block
+bootstrap over its frames (see ``statistics``): whole frames with all their repeats are drawn, in
+blocks of neighbours in time. It covers the choice of frames; what other places would give is
+only seen by comparing sequences (``summarise_methods``, ``paper_ranks``).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.metrics import right
+from adversarial_lcd_ros.evaluation.replay.summary import KINDS
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
+
+OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
+# What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
+CELL = ('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle', 'mode',
+        'ratio', 'edits', 'queries_per_edit', 'nodes', 'threshold', 'variant')
+ATTACK = CELL[1:]
+# What a row need not say.
+USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
+_MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
+          'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
+          'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
+_KINDS = dict(zip(KINDS, (POSITIVE, NEGATIVE, 0, 0, 0), strict=True))
+_BOOTSTRAP_SEED = 0
+
+Row = Mapping[str, Any]
+Cell = dict[str, Any]
+
+
+def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
+    """
+    Return one summary for all seeds of an attack on a sequence; the order of rows is no matter.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Cells as the recipe writes them: the names of ``CELL``, ``seed``, the figures of the run
+        and ``frame_results`` (stamp, kind, clean, attacked, edits, queries of every frame).
+
+    Returns
+    -------
+    list of dict
+        ``CELL``; means over the seeds of the figures; and
+
+        * ``trained_on``: the detector was trained on frames of the sequence; None if unknown
+        * ``different_positives``, ``different_negatives``: frames of a kind, repeats once
+        * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
+        * ``ci95``: of the decline, percentage points; None if a class of frames is empty
+        * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
+        * ``share_of_optimum``: decline over that of ``OPTIMUM`` on the same sequence, target,
+          ratio, size of graph and threshold (the largest, if there are several); None without,
+          or if the optimum takes nothing
+        * ``duration_s``: of all repeats together
+
+    Raises
+    ------
+    EvaluationError
+        A row lacks something, or two rows are of the same cell and seed.
+
+    """
+    groups: dict[tuple[Hashable, ...], list[Row]] = defaultdict(list)
+    for row in rows:
+        groups[_cell_key(row)].append(row)
+    cells = [_summarise(groups[key]) for key in sorted(groups, key=_sort_key)]
+    best = _optima(cells)
+    for cell in cells:
+        optimum = best.get(_yardstick(cell))
+        share = (None if cell['decline_pp'] is None or optimum is None or optimum <= 0
+                 else cell['decline_pp'] / optimum)
+        cell['share_of_optimum'] = share
+    return cells
+
+
+def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
+    """
+    Return one summary for each attack over its sequences, each weighing the same.
+
+    Parameters
+    ----------
+    cells : sequence of dict
+        From ``summarise_cells``.
+
+    Returns
+    -------
+    list of dict
+        ``ATTACK``; ``sequences`` (names; those that are ``is_attackable``, if any is),
+        ``decline_pp`` (mean), ``ci95`` (Student's t over the sequences, cut at the possible -100
+        and 100, None below two: resampling so few gives intervals that are too narrow),
+        ``least_pp``, ``most_pp``,
+        ``share_of_optimum`` (of the means, over the sequences that have both); means of the
+        accuracies, of edits and queries; sums of the counts.
+
+    """
+    groups: dict[tuple[Hashable, ...], list[Cell]] = defaultdict(list)
+    for cell in cells:
+        if cell['decline_pp'] is not None:
+            groups[tuple(cell[name] for name in ATTACK)].append(cell)
+    best = _optima(cells)
+    return [{**dict(zip(ATTACK, key, strict=True)),
+             **_over_sequences(list(filter(is_attackable, groups[key])) or groups[key], best)}
+            for key in sorted(groups, key=_sort_key)]
+
+
+def is_attackable(cell: Cell) -> bool:
+    """
+    Tell whether a cell says anything of an attack.
+
+    It does not where a kind of frame is missing, nor where no frame's graph is large enough for
+    one edit.
+    """
+    return cell['decline_pp'] is not None and cell['unattackable'] < cell['frames']
+
+
+def declines_by_sequence(cells: Iterable[Cell],
+                         name: Mapping[tuple[Hashable, ...], str]) -> dict[str, dict[str, float]]:
+    """
+    Return method to sequence to decline of the attacks that have a name, for ``rank_methods``.
+
+    Sequences that not every method has are left out: ranks need complete rows.
+
+    """
+    table: dict[str, dict[str, float]] = {title: {} for title in name.values()}
+    for cell in cells:
+        title = name.get(tuple(cell[factor] for factor in ATTACK))
+        if title is not None and is_attackable(cell):
+            table[title][cell['sequence']] = cell['decline_pp']
+    common = set.intersection(*map(set, table.values())) if table else set()
+    return {title: {sequence: declines[sequence] for sequence in sorted(common)}
+            for title, declines in table.items()}
+
+
+def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
+    """Return which decisions of a cell were right, (n,); ``which`` is 'clean' or 'attacked'."""
+    return np.array([_is_right(frame[which], row) for frame in row['frame_results']], bool)
+
+
+def _cell_key(row: Row) -> tuple[Hashable, ...]:
+    missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
+               if name not in row and name not in ('asked_target', *USUAL)]
+    if missing:
+        raise EvaluationError(f'a row of {row.get("sequence", "an unnamed sequence")} lacks '
+                              f'{", ".join(missing)}: it was not written by this release')
+    # Without another target the attack asked the one that it attacks.
+    given = {**USUAL, **row, 'asked_target': row.get('asked_target') or row['target']}
+    return tuple(given[name] for name in CELL)
+
+
+def _sort_key(key: tuple[Hashable, ...]) -> tuple[tuple[bool, Any], ...]:
+    # Numbers as numbers, names as names.
+    return tuple((isinstance(part, str), part) for part in key)
+
+
+def _summarise(rows: Sequence[Row]) -> Cell:
+    rows = sorted(rows, key=lambda row: row['seed'])
+    seeds = [row['seed'] for row in rows]
+    cell = dict(zip(CELL, _cell_key(rows[0]), strict=True))
+    if len(set(seeds)) < len(seeds):
+        raise EvaluationError(f'two rows of {cell} with one seed among {seeds}: keep one of '
+                              'each, or the repeats would be counted twice')
+    declines = [row['decline_pp'] for row in rows if row['decline_pp'] is not None]
+    positive, negative = _right_before(rows)
+    cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
+    cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
+                trained_on=rows[0].get('trained_on'), **_different_frames(rows),
+                decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
+                ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
+                duration_s=math.fsum(row['duration_s'] for row in rows))
+    return cell
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    there = [value for value in values if value is not None]
+    return math.fsum(there) / len(there) if there else None  # fsum: any order, same sum
+
+
+def _right_before(rows: Sequence[Row]) -> tuple[float, float]:
+    counts = [[int((frame_right(row, 'clean') & (_kinds(row) == kind)).sum()) for row in rows]
+              for kind in (POSITIVE, NEGATIVE)]
+    return float(np.mean(counts[0])), float(np.mean(counts[1]))
+
+
+def _different_frames(rows: Sequence[Row]) -> dict[str, int]:
+    kinds = {frame['stamp']: kind for row in rows
+             for frame, kind in zip(row['frame_results'], _kinds(row), strict=True)}
+    counts = Counter(kinds.values())
+    return {'different_positives': counts[POSITIVE], 'different_negatives': counts[NEGATIVE]}
+
+
+def _kinds(row: Row) -> NDArray[np.int8]:
+    kinds = [_KINDS.get(frame['kind'], frame['kind']) for frame in row['frame_results']]
+    strange = [kind for kind in kinds if kind not in (POSITIVE, NEGATIVE, 0)]
+    if strange:
+        raise EvaluationError(f'{row["sequence"]}: a frame of kind {strange[0]!r}: expected one '
+                              f'of {", ".join(KINDS)}')
+    return np.array(kinds, np.int8)
+
+
+def _is_right(value: Any, row: Row) -> bool:
+    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', ''):
+        return bool(right(np.array(value)))
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise EvaluationError(f'{row["sequence"]}: the decision on a frame is {value!r}: expected an '
+                          'outcome such as TP, or true and false')
+
+
+def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
+    # Repeats may score different frames: sizes and sums are kept for each frame of any.
+    stamps = np.unique([frame['stamp'] for row in rows for frame in row['frame_results']])
+    if len(stamps) < 2:
+        return None
+    size, total = np.zeros((2, 2, len(stamps)), np.int64)
+    for row in rows:
+        place = np.searchsorted(stamps, [frame['stamp'] for frame in row['frame_results']])
+        if len(np.unique(place)) < len(place):
+            raise EvaluationError(f'{row["sequence"]}, seed {row["seed"]}: two frames have one '
+                                  'stamp')
+        lost = frame_right(row, 'clean').astype(np.int64) - frame_right(row, 'attacked')
+        for index, kind in enumerate((POSITIVE, NEGATIVE)):
+            member = _kinds(row) == kind
+            size[index, place] += member
+            total[index, place] += np.where(member, lost, 0)
+    interval = intervals.class_mean_interval(
+        size, total, intervals.block_frames(stamps.astype(np.int64)), _BOOTSTRAP_SEED)
+    return None if interval is None else (100.0 * interval[0], 100.0 * interval[1])
+
+
+def _yardstick(cell: Cell) -> tuple[Hashable, ...]:
+    return tuple(cell[name] for name in ('sequence', 'target', 'ratio', 'nodes', 'threshold'))
+
+
+def _optima(cells: Iterable[Cell]) -> dict[tuple[Hashable, ...], float]:
+    best: dict[tuple[Hashable, ...], float] = {}
+    for cell in cells:
+        if cell['perturbation'] == OPTIMUM and cell['decline_pp'] is not None:
+            key = _yardstick(cell)
+            best[key] = max(best.get(key, -math.inf), cell['decline_pp'])
+    return best
+
+
+def _over_sequences(cells: Sequence[Cell], best: Mapping[tuple[Hashable, ...], float]) -> Cell:
+    declines = np.array([cell['decline_pp'] for cell in cells])
+    count, mean = len(declines), float(declines.mean())
+    half = (float(stats.t.ppf(0.975, count - 1) * declines.std(ddof=1) / math.sqrt(count))
+            if count > 1 else None)
+    both = [(cell['decline_pp'], best[_yardstick(cell)]) for cell in cells
+            if _yardstick(cell) in best]
+    taken, possible = (math.fsum(column) for column in zip(*both, strict=True)) if both else (0, 0)
+    return {
+        'sequences': [cell['sequence'] for cell in cells], 'decline_pp': mean,
+        'ci95': None if half is None else (max(mean - half, -100.0), min(mean + half, 100.0)),
+        'least_pp': float(declines.min()), 'most_pp': float(declines.max()),
+        'seeds': min(cell['seeds'] for cell in cells),
+        'share_of_optimum': taken / possible if possible > 0 else None,
+        **{name: _mean(cell[name] for cell in cells)
+           for name in ('accuracy_clean', 'accuracy_attacked', 'balanced_clean',
+                        'balanced_attacked', 'edits_mean', 'queries_mean', 'nodes_mean',
+                        'success_rate')},
+        **{name: math.fsum(cell[name] for cell in cells)
+           for name in ('suppressed', 'invented', 'unattackable', 'frames', 'found_clean',
+                        'silent_clean')}}

@@ -1,0 +1,1 @@
+"""Every frame of a sequence, through the nodes or without them."""

@@ -1,0 +1,135 @@
+"""report.html: one file that holds all it shows, and opens offline and on a phone."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+import shlex
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
+from adversarial_lcd_ros.evaluation.replay import plots
+from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, read_records, runs_of
+from adversarial_lcd_ros.evaluation.results import (
+    CONFIGURATION,
+    ENVIRONMENT,
+    RECORDS,
+    REPORT,
+    SUMMARY,
+    read_json,
+)
+
+_KIND_TEXT = (('positive', 'a loop is there to be found'),
+              ('negative', 'a new place: no loop is there'),
+              ('between', 'between the two: not scored'),
+              ('no_candidate', 'too early: no frame is old enough'),
+              ('no_ground_truth', 'no ground truth pose'))
+
+
+def write_report(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord],
+                 pictures: Sequence[Picture]) -> Path:
+    """
+    Write the pictures and report.html into a results folder; return the report's path.
+
+    Configuration and environment are read from the folder (``ResultsFolder.write_setup``).
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder, finished or not.
+    summary : mapping
+        From ``summarise``.
+    records : sequence of QueryRecord
+        From ``make_records``.
+    pictures : sequence of Picture
+        Query, match and attacked graph of telling frames.
+
+    Raises
+    ------
+    EvaluationError
+        The folder lacks configuration.json or environment.json, or records and summary are
+        not of the same runs.
+
+    """
+    write_pictures(folder, pictures)
+    return _render(folder, summary, records)
+
+
+def report_folder(folder: Path) -> Path:
+    """
+    Write report.html of a results folder anew from what is in it; return its path.
+
+    Raises
+    ------
+    EvaluationError
+        A file of the folder is missing or damaged.
+
+    """
+    return _render(folder, read_json(folder / SUMMARY), read_records(folder / RECORDS))
+
+
+def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord]) -> Path:
+    runs = runs_of(records)
+    names = [CLEAN, *(attack['name'] for attack in summary['attacks'])]
+    if list(runs) != names:
+        raise EvaluationError(f'{folder}: records of {list(runs)}, summary of {names}: they are '
+                              'not of one evaluation')
+    configuration = read_json(folder / CONFIGURATION)
+    clean = runs[CLEAN]
+    attacks = [(wording.attack_title(attack), runs[attack['name']])
+               for attack in summary['attacks']]
+    curve = plots.precision_recall(clean, attacks)
+    threshold = _threshold(configuration)
+    values = {
+        'summary': summary, 'strongest': wording.strongest(summary), 'wording': wording,
+        'headline': wording.headline(summary),
+        'decline_rows': wording.decline_rows(summary),
+        'figure_rows': wording.figure_rows(summary),
+        'curve': None if curve is None else data_uri(curve, 'svg+xml'),
+        'timeline_wide': data_uri(plots.timeline(clean, attacks, threshold, plots.WIDE),
+                                  'svg+xml'),
+        'timeline_narrow': data_uri(plots.timeline(clean, attacks, threshold, plots.NARROW),
+                                    'svg+xml'),
+        'pictures': [(title, caption, data_uri(data, 'jpeg'))
+                     for title, caption, data in read_pictures(folder)],
+        'sample': _sample(summary), 'configuration': configuration,
+        'command_line': shlex.join(configuration['command_line']),
+        'environment': read_json(folder / ENVIRONMENT)}
+    path = folder / REPORT
+    path.write_text(load_template('report.html.j2').render(values), encoding='utf-8')
+    return path
+
+
+def load_template(name: str) -> Any:
+    """Return a page of the folder templates; a name it lacks is an error."""
+    environment = Environment(loader=PackageLoader('adversarial_lcd_ros.evaluation'),
+                              autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+                              lstrip_blocks=True)
+    return environment.get_template(name)
+
+
+def data_uri(data: bytes, subtype: str) -> str:
+    """Return an image as a link that holds it."""
+    return f'data:image/{subtype};base64,{b64encode(data).decode("ascii")}'
+
+
+def _threshold(configuration: Mapping[str, Any]) -> float:
+    # A results folder always holds the detector's settings; the first section is the clean run's.
+    for section in configuration['settings']:
+        if section['section'] == LcdConfig.title:
+            return float(section['values']['threshold'])
+    raise EvaluationError(f'{CONFIGURATION} has no section {LcdConfig.title!r}: the threshold of '
+                          'the detector is unknown')
+
+
+def _sample(summary: Mapping[str, Any]) -> list[tuple[str, int, float]]:
+    counts = {'positive': summary['positives'], 'negative': summary['negatives'],
+              **summary['not_scored']}
+    return [(text, counts[kind], counts[kind] / summary['frames'])
+            for kind, text in _KIND_TEXT if counts[kind]]

@@ -1,0 +1,246 @@
+"""Evaluation of one sequence over ROS 2: the same bag replayed clean and attacked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+import shutil
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import (
+    AttackConfig,
+    BuilderConfig,
+    LabelConfig,
+    LcdConfig,
+    ReplayConfig,
+)
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
+from adversarial_lcd_ros.evaluation.replay.label_sweep import SWEEP, sweep_labels, write_sweep
+from adversarial_lcd_ros.evaluation.replay.processes import Recording, Setup, run_pipeline
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    AttackRun,
+    QueryRecord,
+    make_records,
+    runs_of,
+    write_records,
+)
+from adversarial_lcd_ros.evaluation.replay.report import write_report
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.results import RECORDS, SUMMARY, ResultsFolder
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
+from adversarial_lcd_ros.graph_sequences.opening import (
+    GraphSequence,
+    holds_graphs,
+    open_graphs,
+)
+from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.sequences import Sequence as CameraSequence
+from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.sequences.bagfile import BagWriter
+from adversarial_lcd_ros.sequences.replay import Replay
+from adversarial_lcd_ros.vision.draw import draw_attack
+
+RECORDINGS = 'recordings'
+PICTURES = 6
+BLANK_GREY = 64
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    Everything that decides what an evaluation gives.
+
+    Attributes
+    ----------
+    builder, lcd, labels, replay
+        Settings; the replay is in lockstep, whatever they say. None for a builder: the bag has
+        graphs.
+    attacks : mapping
+        Settings of every attack by the name of its run.
+    rebuild : bool
+        Replay the images for every attack. Otherwise they are for the first one, which shows
+        whether the graphs come out the same, and the others start from the graphs of that run.
+    seed : int
+        Of the bootstrap.
+    sweep_labels : bool
+        Label the decisions with other thresholds, too.
+
+    """
+
+    builder: BuilderConfig | None
+    lcd: LcdConfig
+    labels: LabelConfig
+    replay: ReplayConfig
+    attacks: Mapping[str, AttackConfig]
+    rebuild: bool = False
+    seed: int = 42
+    sweep_labels: bool = False
+
+
+def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence[str] = (),
+                  tell: Callable[[str], None] = lambda text: None,
+                  keep_recordings: bool = False) -> tuple[Path, dict[str, Any]]:
+    """
+    Replay a bag without and with every attack; return the results folder and the summary.
+
+    Parameters
+    ----------
+    bag : Path
+        Bag with images and ground truth, as "adversarial-lcd import" writes it; or with graphs
+        and ground truth, as "adversarial-lcd build" does: these are used as they are, whatever
+        the settings of the builder.
+    output : Path
+        Folder in which the results folder is made.
+    plan : Plan
+    command_line : sequence of str
+        Kept with the results.
+    tell : callable
+        Gets a line of text for each step.
+    keep_recordings : bool
+        Keep everything that went over the wire (about 30 MB a run of 360 frames).
+
+    Raises
+    ------
+    EvaluationError
+        The bag has no ground truth, a node failed, or messages were lost.
+
+    """
+    started_s = time.monotonic()
+    if holds_graphs(bag):
+        plan = _without_builder(bag, plan, tell)
+    sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
+    if sequence.trajectory is None:
+        raise EvaluationError(f'{bag} has no ground truth: without it nobody can tell what is a '
+                              'loop; import it again with --ground-truth')
+    plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
+    frames = Replay(bag, plan.replay).frame_count
+    folder = ResultsFolder.create(output)
+    runs = _replay(bag, sequence, plan, frames, folder.path / RECORDINGS, tell)
+    tell('labels, figures and pictures')
+    clean = runs.pop(CLEAN)
+    labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in clean.clean],
+                          sequence.image_size, plan.labels)
+    records = make_records(labels, clean.decisions, {
+        name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
+    summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
+        [graph.node_count for graph in clean.clean], [graph.edge_count for graph in clean.clean]),
+        plan.seed)
+    summary['graphs_rebuilt_differently'] = {
+        name: _differing(clean.clean, run.clean) for name, run in runs.items()}
+    if plan.sweep_labels:
+        tell('labels with other thresholds')
+        summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
+                                              plan.labels)
+        write_sweep(folder.path / SWEEP, summary['label_sweep'])
+    summary['duration_s'] = time.monotonic() - started_s
+    _write(folder, plan, summary, records, command_line,
+           _pictures(sequence, clean, runs, records, summary))
+    if not keep_recordings:
+        shutil.rmtree(folder.path / RECORDINGS)
+    return folder.finish(), summary
+
+
+def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
+    if plan.rebuild:
+        raise EvaluationError(f'{bag} has graphs and no images: nothing can be rebuilt')
+    tell('the bag has graphs: they are used as they are, without a graph_builder')
+    return replace(plan, builder=None)
+
+
+def _replay(bag: Path, sequence: CameraSequence | GraphSequence, plan: Plan, frames: int,
+            folder: Path, tell: Callable[[str], None]) -> dict[str, Recording]:
+    """Replay the bag clean and under every attack; return the recordings by name of the run."""
+    runs: dict[str, Recording] = {}
+    for number, (name, attack) in enumerate([(CLEAN, None), *plan.attacks.items()]):
+        from_bag = plan.rebuild or number < 2
+        tell(f'run {number + 1} of {len(plan.attacks) + 1}: {name}'
+             + ('' if from_bag else ' (from the graphs of run 2)'))
+        setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
+        source = bag
+        if isinstance(sequence, GraphSequence) and from_bag:
+            # Where the graphs enter the pipeline depends on whether somebody is in the middle.
+            source = folder / f'graphs_{number}'
+            with BagWriter(source) as copy:
+                write_graphs(copy, sequence, CLEAN_TOPIC if attack else GRAPH_TOPIC)
+        if not from_bag:
+            # The recording holds the chosen frames only: nothing is to be skipped again.
+            replay = ReplayConfig(lockstep=True, window=plan.replay.window,
+                                  timeout_s=plan.replay.timeout_s, clock=plan.replay.clock)
+            source, setup = folder / '1' / 'recording', Setup(None, plan.lcd, replay, attack)
+        runs[name] = run_pipeline(source, setup, folder / f'{number}')
+        _check(name, runs[name], frames)
+    return runs
+
+
+def _check(name: str, run: Recording, frames: int) -> None:
+    """Refuse a run that lost a message or whose attacker broke its word."""
+    counts = {'graphs': len(run.clean), 'forwarded graphs': len(run.forwarded),
+              'decisions': len(run.decisions)}
+    if name != CLEAN:
+        counts['attack reports'] = len(run.reports)
+    wrong = {what: count for what, count in counts.items() if count != frames}
+    if wrong:
+        raise EvaluationError(f'run {name}: {frames} frames, but ' + ', '.join(
+            f'{count} {what}' for what, count in wrong.items()))
+    for before, after, report in zip(run.clean, run.forwarded, run.reports, strict=False):
+        if len(before.flips_to(after)) > report.edit_budget:
+            raise EvaluationError(f'run {name}: graph {before.sequence} was changed in more '
+                                  f'edges than its budget of {report.edit_budget}')
+
+
+def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]) -> int:
+    """Count the frames whose clean graph was built differently in another replay."""
+    return sum(a != b for a, b in zip(first, second, strict=True))
+
+
+def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
+           records: Sequence[QueryRecord], command_line: Sequence[str],
+           pictures: Sequence[Picture]) -> None:
+    sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
+    folder.write_setup([section for section in sections if section], command_line, plan.seed)
+    folder.write_json(SUMMARY, summary)
+    write_records(folder.path / RECORDS, records)
+    write_report(folder.path, summary, records, pictures)
+
+
+def _images(sequence: CameraSequence | GraphSequence,
+            wanted: set[int]) -> dict[int, NDArray[np.uint8]]:
+    """Return the frames with these stamps; blank ones where there are only graphs."""
+    if isinstance(sequence, GraphSequence):
+        width, height = sequence.image_size
+        return dict.fromkeys(wanted, np.full((height, width, 3), BLANK_GREY, np.uint8))
+    return {frame.stamp_ns: frame.image() for frame in sequence.frames()
+            if frame.stamp_ns in wanted}
+
+
+def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
+              runs: Mapping[str, Recording], records: Sequence[QueryRecord],
+              summary: Mapping[str, Any]) -> list[Picture]:
+    """Return query, match and attacked graph of telling frames of the strongest attack."""
+    if not runs:
+        return []
+    strongest = max(summary['attacks'], key=lambda attack: attack['decline_pp'] or 0.0)['name']
+    by_run = runs_of(records)
+    chosen = choose_records(by_run[strongest], PICTURES)
+    wanted = {record.stamp_ns for record in chosen} | {
+        clean.clean[record.match_frame].stamp_ns for record in chosen
+        if record.match_frame is not None}
+    image = _images(sequence, wanted)
+    pictures = []
+    for record in chosen:
+        title, caption = describe(record, by_run[CLEAN][record.frame])
+        match = clean.clean[record.match_frame if record.match_frame is not None
+                            else record.frame]
+        run = runs[strongest]
+        pictures.append(Picture(f'{title} ({strongest})', caption, np.asarray(draw_attack(
+            image[record.stamp_ns], run.clean[record.frame], image[match.stamp_ns], match,
+            run.forwarded[record.frame]), np.uint8)))
+    return pictures

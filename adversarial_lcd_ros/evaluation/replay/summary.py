@@ -1,0 +1,149 @@
+"""summary.json: the figures of one evaluation, from its records."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.metrics import (
+    Metrics,
+    effect,
+    first_closure_latency_s,
+    measure,
+    right,
+)
+from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
+
+SCHEMA = 1
+KINDS = ('positive', 'negative', 'between', 'no_candidate', 'no_ground_truth')
+
+
+@dataclass(frozen=True)
+class GraphStatistics:
+    """How many graphs the builder sent in the clean run, and their mean size."""
+
+    count: int
+    nodes_mean: float
+    edges_mean: float
+
+    @classmethod
+    def of(cls, nodes: Sequence[int], edges: Sequence[int]) -> GraphStatistics:
+        """Return the statistics of graphs with the given node and edge counts."""
+        if not nodes or len(nodes) != len(edges):
+            raise EvaluationError(f'{len(nodes)} node counts and {len(edges)} edge counts: '
+                                  'expected one of each for every graph, and at least one graph')
+        return cls(len(nodes), float(np.mean(nodes)), float(np.mean(edges)))
+
+
+def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[str, AttackConfig],
+              graphs: GraphStatistics, seed: int,
+              block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
+    """
+    Return the content of summary.json; undefined figures are None.
+
+    Parameters
+    ----------
+    sequence : str
+        Name of the sequence.
+    records : sequence of QueryRecord
+        From ``make_records``.
+    attacks : mapping
+        Settings of every attack by the name of its run.
+    graphs : GraphStatistics
+        Of the clean run.
+    seed : int
+        Of the whole evaluation; also seeds the bootstrap.
+    block_s : float
+        Length of the bootstrap's blocks, seconds.
+
+    Raises
+    ------
+    EvaluationError
+        Frames, graphs and decisions differ in number, or runs and attacks in name.
+
+    """
+    runs = runs_of(records)
+    if list(runs) != [CLEAN, *attacks]:
+        raise EvaluationError(f'runs {list(runs)}: expected {[CLEAN, *attacks]}')
+    clean = runs.pop(CLEAN)
+    if graphs.count != len(clean):
+        raise EvaluationError(f'{graphs.count} graphs for {len(clean)} frames: the run lost or '
+                              'repeated messages and gives no figure: run it again')
+    block = intervals.block_frames(column(clean, 'stamp_ns'), block_s)
+    kinds = Counter(record.kind for record in clean)
+    return {
+        'schema': SCHEMA, 'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
+        'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
+        'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
+        'negatives': kinds['negative'], 'not_scored': {name: kinds[name] for name in KINDS[2:]},
+        'clean': _run_figures(clean, block, seed),
+        'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
+                    for name, run in runs.items()],
+        'seed': seed,
+        'bootstrap': {'block_s': block_s, 'block_frames': block, 'blocks': len(clean) / block,
+                      'replicates': intervals.REPLICATES, 'level': intervals.LEVEL}}
+
+
+def run_metrics(run: Sequence[QueryRecord]) -> Metrics:
+    """Return the figures of the records of one run."""
+    return measure(column(run, 'label'), column(run, 'is_loop'),
+                   column(run, 'probability').astype(np.float64), column(run, 'match_correct'))
+
+
+def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
+    kind, outcome = column(run, 'label'), column(run, 'outcome')
+    return {
+        **run_metrics(run).as_dict(),
+        'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
+            kind, right(outcome), block, seed),
+        # Outside the scored frames a closure with another place is still wrong.
+        'wrong_closures_unscored': sum(
+            record.is_loop and not record.match_correct and not record.outcome
+            and record.kind != 'no_ground_truth' for record in run),
+        'first_closure_latency_s': first_closure_latency_s(
+            column(run, 'stamp_ns'), kind, outcome)}
+
+
+def _attack_figures(name: str, config: AttackConfig, clean: Sequence[QueryRecord],
+                    run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
+    kind = column(clean, 'label')
+    before, after = column(clean, 'outcome'), column(run, 'outcome')
+    change = asdict(effect(kind, before, after))
+    return {
+        'name': name, 'perturbation': config.perturbation, 'surrogate': config.surrogate,
+        'ratio': config.ratio, 'mode': config.mode, 'edit_kinds': config.edits,
+        'seed': config.seed, 'decisions': len(run), **_effort(run),
+        **_run_figures(run, block, seed), **change,
+        'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
+                                                    seed)}
+
+
+def _effort(run: Sequence[QueryRecord]) -> dict[str, Any]:
+    # Means are over all frames: those that could not be attacked count with nothing spent.
+    attacked = [record for record in run if not _unattackable(record)]
+    skipped = Counter(record.reason or 'no reason given' for record in run
+                      if _unattackable(record))
+    status = Counter(record.status for record in run)
+    duration_ms = 1e3 * column(run, 'duration_s').astype(np.float64)
+    return {
+        'edits_mean': float(np.mean(column(run, 'edits'))),
+        'edit_budget_mean': float(np.mean(column(run, 'edit_budget'))),
+        'queries_mean': float(np.mean(column(run, 'queries'))),
+        'queries_mean_attacked': (float(np.mean(column(attacked, 'queries')))
+                                  if attacked else None),
+        'queries_total': int(np.sum(column(run, 'queries'))),
+        'unattackable': len(run) - len(attacked), 'unattackable_reasons': dict(skipped),
+        'success': status['success'], 'failure': status['failure'],
+        'duration_ms_median': float(np.median(duration_ms)),
+        'duration_ms_p99': float(np.quantile(duration_ms, 0.99))}
+
+
+def _unattackable(record: QueryRecord) -> bool:
+    return record.status == 'skipped' or not record.edit_budget

@@ -1,0 +1,1 @@
+"""The graphs of a sequence: built once, opened from anywhere."""

@@ -1,0 +1,92 @@
+"""Graphs into a bag, for replays without images: ``adversarial-lcd build``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+import heapq
+import json
+from pathlib import Path
+
+from adversarial_lcd_ros import __version__
+from adversarial_lcd_ros.codec import encode_graph
+from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, Progress, open_graphs
+from adversarial_lcd_ros.payload import WIRE_TYPE, wrap
+from adversarial_lcd_ros.sequences.bagfile import BagWriter
+from adversarial_lcd_ros.sequences.importing import pose_messages
+from adversarial_lcd_ros.sequences.replay import payload_schemas
+from adversarial_lcd_ros.training.sources import TrainingSource, terms_of
+
+# What the detector hears, and what goes to an attacker first.
+GRAPH_TOPIC, CLEAN_TOPIC = '/graph', '/graph_clean'
+PROVENANCE = 'adversarial_lcd_ros/build'
+
+
+@dataclass(frozen=True)
+class GraphBagSummary:
+    """What a build has written."""
+
+    path: Path
+    graphs: GraphSequence
+    poses: int
+    size_bytes: int
+
+
+def build_graph_bag(source: str, destination: Path, config: BuilderConfig, *,
+                    cache: Path | None = None, progress: Progress | None = None,
+                    overwrite: bool = False) -> GraphBagSummary:
+    """
+    Write the graphs of a sequence, and its ground truth, as a rosbag2 in MCAP.
+
+    Graphs become std_msgs/UInt8MultiArray on /graph. The settings that they were built with,
+    and the schemas of the payloads, go into the metadata; credits and licence files of a source
+    folder go with what was made of the pictures.
+
+    Parameters
+    ----------
+    source, config, cache, progress
+        See ``open_graphs``.
+    destination : Path
+        Folder of the bag; it appears when it is complete, or not at all.
+    overwrite : bool
+        Replace a bag that is there.
+
+    Raises
+    ------
+    SequenceError
+        The destination exists; or see ``open_graphs``.
+
+    """
+    # Before the minutes of work, to see whether the place is free.
+    with BagWriter(destination, overwrite=overwrite) as bag:
+        found = open_graphs(source, config, cache, progress)
+        bag.note(PROVENANCE, json.dumps({
+            'source': source, 'name': found.name, 'settings': asdict(config),
+            'version': __version__}))
+        poses = write_graphs(bag, found)
+        path = TrainingSource.parse(source).path
+        for name in terms_of(path) if path.is_dir() else ():
+            bag.attach(path / name)
+    return GraphBagSummary(destination, found, poses,
+                           sum(file.stat().st_size for file in destination.iterdir()))
+
+
+def write_graphs(bag: BagWriter, found: GraphSequence, topic: str = GRAPH_TOPIC) -> int:
+    """Write graphs, and the ground truth of their time, to a bag; return the number of poses."""
+    for message, text in payload_schemas().items():
+        bag.note(message, text)
+    stamps = [graph.stamp_ns for graph in found.graphs]
+    poses = list(pose_messages(found.trajectory, stamps[0], stamps[-1]))
+    # At the same time, the pose comes first: the key sorts by nothing else.
+    for name, kind, stamp_ns, cdr in heapq.merge(poses, _graph_messages(found.graphs, topic),
+                                                 key=lambda row: row[2]):
+        bag.write(name, kind, stamp_ns, cdr)
+    return len(poses)
+
+
+def _graph_messages(graphs: list[MultiTierGraph],
+                    topic: str) -> Iterator[tuple[str, str, int, bytes]]:
+    for graph in graphs:
+        yield topic, WIRE_TYPE, graph.stamp_ns, wrap(encode_graph(graph))

@@ -1,0 +1,223 @@
+"""The graphs of a sequence: what every evaluation without ROS starts from."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+import logging
+from pathlib import Path
+from typing import TypeVar
+
+from adversarial_lcd_ros.codec import decode_graph
+from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.cache import cache_key, load_graphs, save_graphs
+from adversarial_lcd_ros.paths import cache_folder
+from adversarial_lcd_ros.sequences import Sequence, Trajectory, open_sequence
+from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, PAYLOAD, BagFile, is_bag
+from adversarial_lcd_ros.sequences.bags import bag_trajectory
+from adversarial_lcd_ros.sequences.detections import read_detections
+from adversarial_lcd_ros.sequences.frame import NO_PICTURE
+from adversarial_lcd_ros.sequences.replay import Replay, read_payloads
+from adversarial_lcd_ros.training.sources import TrainingSource
+from adversarial_lcd_ros.vision.builder import GraphBuilder
+
+FRAMES_AT_ONCE = 2
+Progress = Callable[[int, int], None]
+ItemT = TypeVar('ItemT')
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class GraphSequence:
+    """
+    The graphs of a sequence, or of a part of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the sequence, and which of its frames.
+    graphs : list of MultiTierGraph
+        In order of time. Their sequence numbers are those of the frames in the whole sequence.
+    trajectory : Trajectory or None
+        Ground truth of the whole sequence; None where it has none.
+    image_size : (int, int)
+        Width and height, pixels.
+
+    """
+
+    name: str
+    graphs: list[MultiTierGraph]
+    trajectory: Trajectory | None
+    image_size: tuple[int, int]
+
+
+def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
+                progress: Progress | None = None) -> GraphSequence:
+    """
+    Return the graphs of a sequence: read from its bag, from the cache, or built.
+
+    Parameters
+    ----------
+    source : str
+        ``PATH`` or ``PATH@FROM:TO``, a part of its frames (``PATH@0:0.5`` is the first half).
+        The path is anything that ``open_sequence`` opens, or a bag with graphs in place of
+        images, as "adversarial-lcd build" writes it: its graphs are taken as they are, those on
+        graph_clean where there are any.
+    config : BuilderConfig
+        How graphs are built; graphs of a bag stay what they are. A sequence of detections alone
+        takes the detector 'csv', and reads its own unless others are named.
+    cache : Path, optional
+        Folder of graphs that were built before; by default one in the user's cache. Delete it
+        whenever you like.
+    progress : callable, optional
+        Called with (frames done, frames in all).
+
+    Raises
+    ------
+    SequenceError
+        The source is missing or damaged, or the part holds no frame.
+    ConfigError
+        The detector needs pictures, or a file that is not named.
+    ModelError
+        The vocabulary or the object model is missing.
+    EvaluationError
+        The cache cannot be written.
+
+    """
+    part = TrainingSource.parse(source)
+    if holds_graphs(part.path):
+        return _recorded_graphs(part)
+    sequence = open_sequence(part.path)
+    config = for_sequence(config, sequence)
+    numbers = part.numbers(sequence.frame_count)
+    folder = cache_folder() / 'graphs' if cache is None else cache
+    path = folder / f'{cache_key(sequence, numbers, config)}.npz'
+    graphs = _cached(path)
+    if graphs is None:
+        graphs = list(build_graphs(sequence, config, numbers, progress))
+        save_graphs(path, graphs)
+    elif progress:
+        progress(len(graphs), len(graphs))
+    return GraphSequence(_name(sequence.name, numbers, sequence.frame_count), graphs,
+                         sequence.trajectory, sequence.image_size)
+
+
+def build_graphs(sequence: Sequence, config: BuilderConfig, numbers: range | None = None,
+                 progress: Progress | None = None) -> Iterator[MultiTierGraph]:
+    """
+    Build and yield the graphs of some frames in order, two frames at once.
+
+    Parameters
+    ----------
+    sequence : Sequence
+    config : BuilderConfig
+    numbers : range, optional
+        The frames; all of them if not given.
+    progress : callable, optional
+        Called with (frames done, frames in all).
+
+    """
+    numbers = range(sequence.frame_count) if numbers is None else numbers
+    with GraphBuilder(for_sequence(config, sequence), FRAMES_AT_ONCE) as builder:
+        begun = _begun(builder, sequence, numbers)
+        for done, graph in enumerate(_held_back(begun, FRAMES_AT_ONCE - 1), 1):
+            yield graph()
+            if progress:
+                progress(done, len(numbers))
+
+
+def _begun(builder: GraphBuilder, sequence: Sequence,
+           numbers: range) -> Iterator[Callable[[], MultiTierGraph]]:
+    for number, frame in zip(numbers, sequence.frames(numbers.start, numbers.stop), strict=True):
+        if frame.encoding == NO_PICTURE:
+            yield partial(builder.build_objects, frame.stamp_ns, frame.width, frame.height,
+                          sequence=number)
+        else:
+            yield builder.begin(frame.image(), frame.stamp_ns, sequence=number).graph
+
+
+def _held_back(items: Iterable[ItemT], count: int) -> Iterator[ItemT]:
+    """Yield an item only when so many after it have been taken, too."""
+    waiting: deque[ItemT] = deque()
+    for item in items:
+        waiting.append(item)
+        if len(waiting) > count:
+            yield waiting.popleft()
+    yield from waiting
+
+
+def for_sequence(config: BuilderConfig, sequence: Sequence) -> BuilderConfig:
+    """
+    Return the settings with the detections of the sequence, where these are asked for.
+
+    Raises
+    ------
+    ConfigError
+        The frames have no pictures, but a network is to look at them.
+    SequenceError
+        No frame has detections: they are those of another sequence.
+
+    """
+    if sequence.detections and config.detector != 'csv':
+        raise ConfigError(f'{sequence.source} has no pictures, only {sequence.detections.name}: '
+                          f'expected the detector "csv", found "{config.detector}"')
+    if config.detector != 'csv':
+        return config
+    if not config.detections and sequence.detections:
+        return replace(config, detections=str(sequence.detections))
+    if config.detections:
+        _check_detections(config, sequence)
+    return config
+
+
+def _check_detections(config: BuilderConfig, sequence: Sequence) -> None:
+    table = read_detections(Path(config.detections))
+    tolerance_ns = round(config.detections_tolerance_s * 1e9)
+    near = [table.rows_near(stamp, tolerance_ns) for stamp in sequence.stamps_ns.tolist()]
+    if not any(rows.stop > rows.start for rows in near):
+        raise SequenceError(
+            f'{config.detections} has no detection within {config.detections_tolerance_s:g} s of '
+            f'any of the {sequence.frame_count} frames of {sequence.source}: is it that of '
+            'another sequence?')
+
+
+def _cached(path: Path) -> list[MultiTierGraph] | None:
+    if not path.exists():
+        return None
+    try:
+        return load_graphs(path)
+    except EvaluationError as error:
+        _log.warning('%s; building the graphs again', error)
+        return None
+
+
+def _name(name: str, numbers: range, count: int) -> str:
+    if len(numbers) == count:
+        return name
+    return f'{name}, frames {numbers[0]} to {numbers[-1]} of {count}'
+
+
+def holds_graphs(path: Path) -> bool:
+    """Tell whether a path is a bag that has graphs, or other payloads, and no images."""
+    if not is_bag(path):
+        return False
+    with BagFile(path) as bag:
+        return not bag.of_type(IMAGE, COMPRESSED_IMAGE) and bool(bag.of_type(PAYLOAD))
+
+
+def _recorded_graphs(part: TrainingSource) -> GraphSequence:
+    """Return the graphs of a bag without images."""
+    topic, = Replay(part.path, ReplayConfig()).frame_topics
+    graphs = [decode_graph(payload) for _, payload in read_payloads(part.path, topic)]
+    sizes = sorted({(graph.width, graph.height) for graph in graphs})
+    if len(sizes) != 1:
+        raise SequenceError(f'bag {part.path} has graphs of images of several sizes on {topic}: '
+                            f'{sizes}; a sequence has one image size')
+    numbers = part.numbers(len(graphs))
+    return GraphSequence(_name(part.path.resolve().stem, numbers, len(graphs)),
+                         graphs[numbers.start:numbers.stop],
+                         bag_trajectory(part.path, graphs[0].frame_id), sizes[0])

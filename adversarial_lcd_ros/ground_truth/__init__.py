@@ -1,0 +1,1 @@
+"""What is a loop, from ground truth only."""

@@ -1,0 +1,259 @@
+"""
+Which frames and pairs of frames are loops, from ground truth only (docs/evaluation.md).
+
+Two questions are kept apart. A *pair* of frames shows the same place, different places, or
+something between (``relation``, for the pair protocol). A *frame* of a replay has a loop to be
+found among its earlier frames, has none, or lies between (``label_frames``, for the live one).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from adversarial_lcd_ros.config import LabelConfig
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.sequences import Trajectory
+
+POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
+NO_MATCH = -1
+PLACE_INDEX = 'place_index'
+# The relation of all pairs takes a few bytes a pair: 20,000 frames are about 1.6 GB.
+MAX_FRAMES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLabels:
+    """
+    What ground truth says about every frame of a replay.
+
+    Attributes
+    ----------
+    stamp_ns : int64, (n,)
+        Frames, ascending.
+    kind : int8, (n,)
+        +1: a loop is there to be found. -1: there is none, only other places. 0: not scored.
+    relation : int8, (n, n)
+        Of every pair: +1 loop, -1 different places, 0 between, too close in time, or unknown.
+    possible : bool, (n, n)
+        Pairs that a loop closure may rightly name: the views share enough.
+    candidates : int64, (n,)
+        The frames 0 .. candidates[i] - 1 are old enough to close a loop with frame i.
+    located : bool, (n,)
+        A ground truth pose is near the frame.
+
+    """
+
+    stamp_ns: NDArray[np.int64]
+    kind: NDArray[np.int8]
+    relation: NDArray[np.int8]
+    possible: NDArray[np.bool_]
+    candidates: NDArray[np.int64]
+    located: NDArray[np.bool_]
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Return the kind of every frame in words, as in per_query.csv."""
+        words = np.select(
+            [self.kind == POSITIVE, self.kind == NEGATIVE, ~self.located, self.candidates == 0],
+            ['positive', 'negative', 'no_ground_truth', 'no_candidate'], 'between')
+        return [str(word) for word in words]
+
+    def count(self, name: str) -> int:
+        """Return the number of frames of a kind in words."""
+        return self.names.count(name)
+
+    def is_correct(self, query: ArrayLike, match: ArrayLike) -> NDArray[np.bool_]:
+        """
+        Tell for each query frame whether a closure with the matched frame is right.
+
+        It is unless ground truth contradicts it: the match must be old enough to be a loop and
+        the two views must share enough (``possible``). A match whose view overlap lies between
+        "enough" and "a loop" is right on a frame that has a loop.
+
+        Parameters
+        ----------
+        query, match : int, (k,)
+            Frame indices; NO_MATCH where the detector named none.
+
+        """
+        queries, matches = np.asarray(query, np.int64), np.asarray(match, np.int64)
+        old_enough = (matches >= 0) & (matches < self.candidates[queries])
+        right: NDArray[np.bool_] = old_enough & self.possible[queries, np.maximum(matches, 0)]
+        return right
+
+
+@dataclass(frozen=True, eq=False)
+class _Judgement:
+    # Symmetric (n, n) bool: a loop but for time; may be a loop; certainly another place; a
+    # camera that came from one to the other has left in between.
+    near: NDArray[np.bool_]
+    possible: NDArray[np.bool_]
+    far: NDArray[np.bool_]
+    left: NDArray[np.bool_]
+
+
+def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
+                 config: LabelConfig) -> FrameLabels:
+    """
+    Label every frame of a replay for the live protocol.
+
+    Positive: at least one earlier frame makes a loop with it (``relation`` +1). Negative: none
+    of the frames old enough is even a possible loop. All else is not scored: frames between,
+    frames so early that no frame is old enough (silence is trivially right there), and frames
+    without a ground truth pose. Candidates without a pose are ignored.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Ground truth; frame_id 'world' (metres) or 'place_index'.
+    stamp_ns : int, (n,)
+        Frames of the replay, strictly ascending.
+    image_size : (int, int)
+        Width and height, pixels.
+    config : LabelConfig
+        Thresholds.
+
+    Raises
+    ------
+    EvaluationError
+        Stamps do not ascend, there are too many frames, or none has a ground truth pose.
+
+    """
+    stamps = _checked_stamps(stamp_ns)
+    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
+    if not located.any():
+        raise EvaluationError(
+            f'none of {len(stamps)} frames has a ground truth pose within '
+            f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
+    rows = replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
+                   quaternion=trajectory.quaternion[row])
+    judgement = _judge(rows, image_size, config)
+    for part in (judgement.near, judgement.possible, judgement.far, judgement.left):
+        part &= located[:, None] & located[None, :]
+    candidates = _candidates(stamps, config.min_gap_s)
+    pairs = _relation(judgement, candidates)
+    return FrameLabels(stamps, _kinds(pairs, judgement.possible, candidates, located), pairs,
+                       judgement.possible, candidates, located)
+
+
+def relation(rows: Trajectory, image_size: tuple[int, int],
+             config: LabelConfig) -> NDArray[np.int8]:
+    """
+    Return how every two frames are related, shape (n, n), symmetric.
+
+    +1 same place: a loop. The views are near (overlap seen from both sides, distance, angle),
+    at least ``min_gap_s`` apart, and the camera looked elsewhere at some time in between.
+    -1 different places: the views share almost nothing, whichever side one looks from.
+    0 all else, also every pair less than ``min_gap_s`` apart.
+
+    Parameters
+    ----------
+    rows : Trajectory
+        One pose a frame, with the stamps of the frames, strictly ascending.
+    image_size : (int, int)
+        Width and height, pixels.
+    config : LabelConfig
+        Thresholds.
+
+    """
+    stamps = _checked_stamps(rows.stamp_ns)
+    return _relation(_judge(rows, image_size, config), _candidates(stamps, config.min_gap_s))
+
+
+def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
+    stamps = np.asarray(stamp_ns, np.int64)
+    if not 0 < len(stamps) <= MAX_FRAMES:
+        raise EvaluationError(f'{len(stamps)} frames to label: expected 1 to {MAX_FRAMES}; take '
+                              'a part of the sequence or every k-th frame')
+    if np.any(np.diff(stamps) <= 0):
+        at = int(np.flatnonzero(np.diff(stamps) <= 0)[0]) + 1
+        raise EvaluationError(f'frame {at} is not later than the one before it: frames to label '
+                              'must ascend in time')
+    return stamps
+
+
+def _nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
+                  tolerance_s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
+    if not len(known_ns):
+        raise EvaluationError('the ground truth holds no pose: expected at least one')
+    after = np.clip(np.searchsorted(known_ns, wanted_ns), 1, max(len(known_ns) - 1, 1))
+    after = np.minimum(after, len(known_ns) - 1)
+    before = np.maximum(after - 1, 0)
+    earlier = np.abs(wanted_ns - known_ns[before]) <= np.abs(known_ns[after] - wanted_ns)
+    row = np.where(earlier, before, after)
+    return row, np.abs(known_ns[row] - wanted_ns) <= round(tolerance_s * 1e9)
+
+
+def _candidates(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
+    # Frames 0 .. k - 1 are at least min_gap_s older; never the frame itself.
+    gap_ns = max(round(min_gap_s * 1e9), 1)
+    count: NDArray[np.int64] = np.searchsorted(stamps, stamps - gap_ns, side='right')
+    return count
+
+
+def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -> _Judgement:
+    if rows.frame_id == PLACE_INDEX:
+        apart = np.abs(rows.position[:, :1] - rows.position[:, 0])
+        possible = apart < config.negative_index
+        return _Judgement(apart <= config.positive_index, possible, ~possible, ~possible)
+    near, far = _by_distance(rows, config)
+    if config.rule == 'distance':
+        # Within a room a camera is never far by this rule: to leave is to be no longer near.
+        return _Judgement(near, ~far, far, ~near)
+    seen = visible_points(rows.position, rows.quaternion, image_size, config.focal_length)
+    mutual, either = np.minimum(seen, seen.T), np.maximum(seen, seen.T)
+    possible = mutual >= config.possible_overlap * GRID_POINTS
+    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible,
+                      either < config.negative_overlap * GRID_POINTS, ~possible)
+
+
+def _by_distance(rows: Trajectory,
+                 config: LabelConfig) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    count = len(rows.position)
+    unit = rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True)
+    near, far = np.zeros((count, count), bool), np.zeros((count, count), bool)
+    for start in range(0, count, 256):  # bounds the float64 scratch memory
+        block = slice(start, start + 256)
+        offset = rows.position[block, None, :] - rows.position[None, :, :]
+        distance = np.sqrt(np.einsum('ijk,ijk->ij', offset, offset))
+        # Rotations are an angle apart of which half has the cosine |q_i . q_j|.
+        cosine = np.minimum(np.abs(unit[block] @ unit.T), 1.0)
+        angle = np.degrees(2.0 * np.arccos(cosine))
+        near[block] = ((distance <= config.positive_distance_m)
+                       & (angle <= config.positive_angle_deg))
+        far[block] = ((distance >= config.negative_distance_m)
+                      | (angle >= config.negative_angle_deg))
+    return near, far
+
+
+def _relation(judgement: _Judgement, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
+    count = len(candidates)
+    index = np.arange(count)
+    # The newest earlier frame that looked elsewhere: a loop partner must be older than that.
+    elsewhere = np.tril(judgement.left, -1)
+    newest = np.where(elsewhere.any(axis=1), count - 1 - elsewhere[:, ::-1].argmax(axis=1), -1)
+    old_enough = index[None, :] < candidates[:, None]
+    pairs: NDArray[np.int8] = np.zeros((count, count), np.int8)
+    pairs[judgement.far & old_enough] = NEGATIVE
+    pairs[judgement.near & old_enough & (index[None, :] < newest[:, None])] = POSITIVE
+    symmetric: NDArray[np.int8] = pairs + pairs.T  # candidates are below the diagonal only
+    return symmetric
+
+
+def _kinds(pairs: NDArray[np.int8], possible: NDArray[np.bool_], candidates: NDArray[np.int64],
+           located: NDArray[np.bool_]) -> NDArray[np.int8]:
+    old_enough = np.arange(len(candidates))[None, :] < candidates[:, None]
+    known = (old_enough & located[None, :]).any(axis=1) & located
+    kind: NDArray[np.int8] = np.zeros(len(candidates), np.int8)
+    kind[known & ~(possible & old_enough).any(axis=1)] = NEGATIVE
+    kind[((pairs == POSITIVE) & old_enough).any(axis=1)] = POSITIVE
+    return kind

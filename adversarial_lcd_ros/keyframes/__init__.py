@@ -1,0 +1,1 @@
+"""Graphs of the past, and how alike their words are."""

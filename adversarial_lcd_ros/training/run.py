@@ -1,0 +1,291 @@
+"""From sequences with ground truth to a folder of artefacts: ``adversarial-lcd train``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass, field, replace
+import json
+from pathlib import Path
+import shutil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros import __version__
+from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
+from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
+from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.results import environment
+from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
+from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
+from adversarial_lcd_ros.training.decisions import (
+    TrainingSequence,
+    collect_surrogate_data,
+    train_decision,
+)
+from adversarial_lcd_ros.training.gnn import require_pytorch
+from adversarial_lcd_ros.training.model_folder import (
+    MODEL_CARD,
+    decision_file,
+    file_digests,
+    model_folder,
+    network_file,
+)
+from adversarial_lcd_ros.training.pair_scores import Progress
+from adversarial_lcd_ros.training.sources import (
+    TrainingFrames,
+    TrainingSource,
+    open_source,
+)
+from adversarial_lcd_ros.vision.builder import GraphBuilder
+from adversarial_lcd_ros.vision.features import FeatureExtractor, to_grey
+from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
+
+FORMAT = 'adversarial_lcd_ros/model_card/1'
+# Wider than what an evaluation counts as a loop: the decision also learns from glancing ones,
+# and from revisits within a few seconds, which short sequences are full of.
+TRAINING_LABELS = LabelConfig(min_gap_s=3.0, positive_overlap=0.45)
+# Trained unless others are asked for: those that need nothing but this package.
+DEFAULT_TARGETS = tuple(name for name in TARGETS if name != GnnTarget.name)
+# Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
+SURROGATE_PERTURBATION = 'random_walk'
+
+Stage = Callable[[str], AbstractContextManager[Progress]]
+
+
+@dataclass(frozen=True)
+class TrainingPlan:
+    """
+    What is trained, and on how much.
+
+    Attributes
+    ----------
+    builder : BuilderConfig
+        Of the graphs; a vocabulary named here is used instead of a new one.
+    lcd : LcdConfig
+        Its map window is that of the decisions; the detector that the surrogate data are
+        queried from has the rest of its settings too.
+    labels : LabelConfig
+        What counts as a loop.
+    targets : tuple of str
+        Targets to train; the first one answers the queries of the surrogate data.
+    pairs : int
+        Most loops, and most random pairs of different places, of a sequence.
+    vocabulary_stride : int
+        Every how many frames one is used for the vocabulary.
+    branching, depth : int
+        Shape of the vocabulary: branching^depth words.
+    flips_per_frame : int
+        Flips queried on each frame of the first sequence; 0: no surrogate data.
+
+    Raises
+    ------
+    ConfigError
+        A target is unknown or named twice, or a number is out of range.
+
+    """
+
+    builder: BuilderConfig = field(default_factory=BuilderConfig)
+    lcd: LcdConfig = field(default_factory=LcdConfig)
+    labels: LabelConfig = TRAINING_LABELS
+    targets: tuple[str, ...] = DEFAULT_TARGETS
+    pairs: int = 600
+    vocabulary_stride: int = 2
+    branching: int = 16
+    depth: int = 3
+    flips_per_frame: int = 8
+
+    def __post_init__(self) -> None:
+        """Check names and ranges."""
+        unknown = sorted(set(self.targets) - set(TARGETS))
+        if unknown or not self.targets or len(set(self.targets)) != len(self.targets):
+            raise ConfigError(f'targets {", ".join(self.targets) or "(none)"}: expected some of '
+                              f'{", ".join(TARGETS)}, each once')
+        for name, low in (('pairs', 1), ('vocabulary_stride', 1), ('branching', 2), ('depth', 1),
+                          ('flips_per_frame', 0)):
+            if getattr(self, name) < low:
+                raise ConfigError(f'{name} = {getattr(self, name)}: expected {low} or more')
+
+
+@contextmanager
+def silent(_: str) -> Iterator[Progress]:
+    """Show nothing of a stage."""
+    yield lambda _done, _total: None
+
+
+def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
+          plan: TrainingPlan | None = None, stage: Stage = silent, overwrite: bool = False,
+          command_line: Sequence[str] = ()) -> dict[str, Any]:
+    """
+    Train vocabulary, decisions and surrogate data, and return their card.
+
+    Written are vocabulary.npz, target_<name>.json, surrogate_data.npz and MODEL_CARD.json, all
+    of them or none. Same sequences, plan and seed: same bytes (on one machine; another build of
+    OpenCV, BLAS or the network may round otherwise).
+
+    Parameters
+    ----------
+    sources : sequence of TrainingSource
+        At least one; the surrogate data come from the first.
+    output : Path
+        Folder of the artefacts.
+    seed : int
+        Of every random choice.
+    plan : TrainingPlan, optional
+    stage : callable, optional
+        Given the title of a stage, returns a context that yields what is called with the work
+        done and the whole.
+    overwrite : bool
+        Replace the artefacts of an earlier training.
+    command_line : sequence of str, optional
+        For the card.
+
+    Raises
+    ------
+    SequenceError
+        A sequence cannot be read, or has no ground truth.
+    EvaluationError
+        A sequence has no loops, no different places, or is too short. Found before the work.
+    ModelError
+        There are too few descriptors for the words, the folder is taken, or the target gnn is
+        asked for without PyTorch.
+
+    """
+    plan = plan or TrainingPlan()
+    with model_folder(output, overwrite=overwrite) as work:
+        opened = _open_all(sources, plan)
+        vocabulary = _write_vocabulary(opened, plan, seed, work / VOCABULARY, stage)
+        builder = replace(plan.builder, vocabulary=str(work / VOCABULARY))
+        sequences = [_build_graphs(source, builder, stage) for source in opened]
+        targets = _write_decisions(sequences, plan, seed, work, stage)
+        surrogate = _write_surrogate_data(sequences[0], plan, seed, work, stage)
+        card = {
+            'format': FORMAT, 'seed': seed, 'command_line': list(command_line),
+            'sequences': [_sequence_card(source, sequence)
+                          for source, sequence in zip(opened, sequences, strict=True)],
+            'vocabulary': vocabulary, 'targets': targets, 'surrogate_data': surrogate,
+            'settings': {'builder': asdict(plan.builder), 'labels': asdict(plan.labels),
+                         'lcd': asdict(plan.lcd), 'pairs': plan.pairs},
+            'files': file_digests(work),
+            **_versions()}
+        (work / MODEL_CARD).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
+    return card
+
+
+def _open_all(sources: Sequence[TrainingSource], plan: TrainingPlan) -> list[TrainingFrames]:
+    """Open and check everything before the first minute of work."""
+    if not sources:
+        raise EvaluationError('no sequence to train on: expected at least one')
+    if GnnTarget.name in plan.targets:
+        require_pytorch()
+    opened = [open_source(source) for source in sources]
+    for source in opened:
+        source.check_labels(plan.labels)
+    stamps = opened[0].stamps_ns
+    if plan.flips_per_frame and stamps[-1] - stamps[0] < MIN_GAP_NS:
+        raise EvaluationError(
+            f'{opened[0].name} lasts {(stamps[-1] - stamps[0]) / 1e9:.1f} s: the surrogate data '
+            f'of the first sequence need revisits after {MIN_GAP_NS / 1e9:g} s; put a longer '
+            'one first, or ask for 0 flips a frame')
+    return opened
+
+
+def _write_vocabulary(opened: Sequence[TrainingFrames], plan: TrainingPlan, seed: int,
+                      path: Path, stage: Stage) -> dict[str, Any]:
+    if plan.builder.vocabulary:
+        given = Path(plan.builder.vocabulary)
+        known = Vocabulary.load(given)
+        shutil.copyfile(given, path)
+        return {'reused': given.name, 'words': len(known.idf)}
+    descriptors: list[NDArray[np.uint8]] = []
+    extractor = FeatureExtractor(plan.builder.detected_features, plan.builder.fast_threshold)
+    for source in opened:
+        frames = range(0, len(source.numbers), plan.vocabulary_stride)
+        with stage(f'features of {source.sequence.name}') as progress:
+            for frame in _counted(source.frames(plan.vocabulary_stride), len(frames), progress):
+                descriptors.append(extractor.extract(to_grey(frame.image())).descriptor)
+    with stage('vocabulary') as progress:
+        train_vocabulary(descriptors, plan.branching, plan.depth, seed).save(path)
+        progress(1, 1)
+    return {'words': plan.branching ** plan.depth, 'branching': plan.branching,
+            'depth': plan.depth, 'frames': len(descriptors), 'stride': plan.vocabulary_stride,
+            'descriptors': sum(map(len, descriptors))}
+
+
+def _build_graphs(source: TrainingFrames, config: BuilderConfig, stage: Stage
+                  ) -> TrainingSequence:
+    with stage(f'graphs of {source.sequence.name}') as progress, GraphBuilder(config) as builder:
+        graphs = [builder.build(frame.image(), frame.stamp_ns, sequence=number)
+                  for number, frame in zip(source.numbers, _counted(
+                      source.frames(), len(source.numbers), progress), strict=True)]
+    return TrainingSequence(f'{source.name} ({source.licence})', graphs, source.trajectory)
+
+
+def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, seed: int,
+                     work: Path, stage: Stage) -> dict[str, Any]:
+    card = {}
+    for target in plan.targets:
+        with stage(f'decision of {target}') as progress:
+            decision = train_decision(target, sequences, lcd=plan.lcd, labels=plan.labels,
+                                      pairs=plan.pairs, seed=seed, progress=progress,
+                                      network=work / network_file(target))
+        decision.save(work / decision_file(target))
+        card[target] = _decision_card(decision)
+    return card
+
+
+def _decision_card(decision: Decision) -> dict[str, Any]:
+    return {'weights': dict(zip(decision.channels, decision.weights, strict=True)),
+            'bias': decision.bias,
+            'training_pairs': [
+                {'loops': sequence['loops'], 'others': sequence['others'],
+                 'balanced_accuracy': accuracy}
+                for sequence, accuracy in zip(decision.card['sequences'],
+                                              decision.card['training_balanced_accuracy'],
+                                              strict=True)]}
+
+
+def _write_surrogate_data(sequence: TrainingSequence, plan: TrainingPlan, seed: int, work: Path,
+                          stage: Stage) -> dict[str, Any] | None:
+    if not plan.flips_per_frame:
+        return None
+    target = plan.targets[0]
+    lcd = replace(plan.lcd, target=target, model=str(work / decision_file(target)))
+    attack = AttackConfig(perturbation=SURROGATE_PERTURBATION, seed=seed)
+    with stage('surrogate data') as progress:
+        data: SurrogateData = collect_surrogate_data(sequence.graphs, lcd, attack,
+                                                     plan.flips_per_frame, progress)
+    bound = data.loop_bound()  # also sees that the attacker will be able to use them
+    data.save(work / SURROGATE_DATA)
+    return {'sequence': sequence.name, 'target': target, 'attack': asdict(attack),
+            'flips_per_frame': plan.flips_per_frame, 'frames': len(data.word_score),
+            'flips': len(data.gain), 'loops': int(data.word_loop.sum()), 'loop_bound': bound}
+
+
+def _sequence_card(source: TrainingFrames, sequence: TrainingSequence) -> dict[str, Any]:
+    sizes = np.array([(graph.node_count, graph.edge_count, graph.object_count)
+                      for graph in sequence.graphs], np.float64).mean(axis=0)
+    nodes, edges, objects = (float(size) for size in sizes)
+    return {'name': source.sequence.name, 'part': [source.source.start, source.source.stop],
+            'frames': len(source.numbers), 'first_frame': source.numbers[0],
+            'last_frame': source.numbers[-1], 'frames_in_all': source.sequence.frame_count,
+            'duration_s': float(source.stamps_ns[-1] - source.stamps_ns[0]) / 1e9,
+            'licence': source.licence, 'terms': list(source.terms),
+            'nodes_mean': nodes, 'edges_mean': edges, 'objects_mean': objects}
+
+
+def _versions() -> dict[str, Any]:
+    # Neither the time nor the machine: two trainings of the same give the same card.
+    found = environment()
+    return {'python': found['python'],
+            'versions': {**found['versions'], 'adversarial_lcd_ros': __version__}}
+
+
+def _counted(frames: Iterable[Any], total: int, progress: Progress) -> Iterator[Any]:
+    for done, frame in enumerate(frames, 1):
+        yield frame
+        progress(done, total)

@@ -1,0 +1,1 @@
+"""Weisfeiler-Lehman features and kernels."""
