@@ -99,8 +99,8 @@ class Attacker:
         graph : MultiTierGraph
             Clean graph from the builder.
         ask : callable
-            Puts a graph before the detector and returns its LcdAnswer; may raise
-            OracleSilentError, which ends the attack on this graph.
+            Puts a graph before the detector; returns its LcdAnswer, the probability of a loop,
+            or whether it is one. May raise OracleSilentError, which ends the attack on this graph.
 
         """
         result = self.attack(graph, ask)

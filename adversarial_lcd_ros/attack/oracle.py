@@ -7,11 +7,16 @@ from dataclasses import dataclass
 import math
 import time
 
+import numpy as np
+
 from adversarial_lcd_ros.codec import LcdAnswer
+from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
 
-Ask = Callable[[MultiTierGraph], LcdAnswer]
+# What a detector of one's own may answer: the probability of a loop, or whether it is one.
+Answer = LcdAnswer | float | bool
+Ask = Callable[[MultiTierGraph], Answer]
 HARD_LOGIT = 1.0
 MAX_LOGIT = 700.0
 
@@ -46,6 +51,26 @@ def answer_logit(answer: LcdAnswer) -> float:
     return math.log(chance) - math.log1p(-chance)
 
 
+def as_answer(answer: Answer) -> LcdAnswer:
+    """
+    Return what a detector said as an answer: a number is soft, a truth value hard.
+
+    Raises
+    ------
+    AdversarialLcdError
+        It is neither, or no probability.
+
+    """
+    if isinstance(answer, LcdAnswer):
+        return answer
+    if isinstance(answer, bool | np.bool_):
+        return LcdAnswer(0, bool(answer), False, float(answer))
+    if isinstance(answer, float | int | np.number) and 0 <= answer <= 1:
+        return LcdAnswer(0, bool(answer >= LcdConfig.threshold), True, float(answer))
+    raise AdversarialLcdError(f'the detector answered {answer!r}: expected a probability from 0 '
+                              'to 1, True or False, or an LcdAnswer')
+
+
 @dataclass
 class Oracle:
     """
@@ -54,7 +79,7 @@ class Oracle:
     Attributes
     ----------
     ask : callable
-        Graph in, LcdAnswer out.
+        Graph in; out an LcdAnswer, the probability of a loop, or whether it is one.
     budget : int
         Most queries.
     deadline_s : float
@@ -86,9 +111,11 @@ class Oracle:
         ------
         BudgetError
             None is left.
+        AdversarialLcdError
+            The answer is none.
 
         """
         if self.exhausted:
             raise BudgetError(f'query {self.used + 1} of {self.budget}: {self.exhausted}')
         self.used += 1
-        return self.ask(graph)
+        return as_answer(self.ask(graph))

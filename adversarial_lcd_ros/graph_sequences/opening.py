@@ -55,7 +55,7 @@ class GraphSequence:
     image_size: tuple[int, int]
 
 
-def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
+def open_graphs(source: str, config: BuilderConfig | None = None, cache: Path | None = None,
                 progress: Progress | None = None) -> GraphSequence:
     """
     Return the graphs of a sequence: read from its bag, from the cache, or built.
@@ -67,7 +67,7 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
         The path is anything that ``open_sequence`` opens, or a bag with graphs in place of
         images, as "adversarial-lcd build" writes it: its graphs are taken as they are, those on
         graph_clean where there are any.
-    config : BuilderConfig
+    config : BuilderConfig, optional
         How graphs are built; graphs of a bag stay what they are. A sequence of detections alone
         takes the detector 'csv', and reads its own unless others are named.
     cache : Path, optional
@@ -92,7 +92,7 @@ def open_graphs(source: str, config: BuilderConfig, cache: Path | None = None,
     if holds_graphs(part.path):
         return _recorded_graphs(part)
     sequence = open_sequence(part.path)
-    config = for_sequence(config, sequence)
+    config = for_sequence(config or BuilderConfig(), sequence)
     numbers = part.numbers(sequence.frame_count)
     folder = cache_folder() / 'graphs' if cache is None else cache
     path = folder / f'{cache_key(sequence, numbers, config)}.npz'
