@@ -11,14 +11,20 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.attack.attacker import Attacker
-from adversarial_lcd_ros.attack.oracle import Oracle, OracleSilentError, answer_logit, edit_budget
+from adversarial_lcd_ros.attack.oracle import (
+    Oracle,
+    OracleSilentError,
+    answer_logit,
+    as_answer,
+    edit_budget,
+)
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS, Allowed, make_perturbation
 from adversarial_lcd_ros.attack.perturbations.eigencentrality import eigencentrality
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.errors import BudgetError, ConfigError, ModelError
+from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError, ConfigError, ModelError
 from adversarial_lcd_ros.lcd.decision import probability
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     flip_features,
@@ -421,3 +427,18 @@ def test_recall_without_queries_adds_what_is_missing():
     detector = SecretDetector(now)
     result = attacker.process(now, detector)
     assert (result.flips.tolist(), result.queries, detector.asked) == (missing, 0, [])
+
+
+@pytest.mark.parametrize(('said', 'is_loop', 'is_soft'), [
+    (True, True, False), (np.bool_(False), False, False), (0.7, True, True),
+    (np.float32(0.25), False, True), (1, True, True)])
+def test_any_callable_may_answer(said, is_loop, is_soft):
+    answer = as_answer(said)
+    assert (answer.is_loop, answer.is_soft) == (is_loop, is_soft)
+    assert answer.probability == float(said)
+
+
+@pytest.mark.parametrize('said', [None, 'yes', -0.1, 1.5, float('nan')])
+def test_what_is_no_answer_is_an_error(said):
+    with pytest.raises(AdversarialLcdError, match='expected a probability'):
+        as_answer(said)
