@@ -1,10 +1,10 @@
-"""Put the rows of results.json as a table into docs/performance.md: python -m benchmarks.table."""
+"""Put the rows of results.json as a table into docs/results/benchmarks.md: python -m benchmarks.table."""
 
 import json
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PAGE = HERE.parent / 'docs' / 'performance.md'
+PAGE = HERE.parent / 'docs' / 'results' / 'benchmarks.md'
 BEGIN = '<!-- table: python -m benchmarks.table -->'
 END = '<!-- end of table -->'
 

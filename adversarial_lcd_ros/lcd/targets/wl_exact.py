@@ -13,7 +13,7 @@ from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.weisfeiler_lehman.histogram import Histogram, histogram
 
 # The least depth at which edges count at all, and the best of 0 to 3 across the training sequences
-# (docs/target.md): each further one adds labels that recur in no other view.
+# (docs/tried.md): each further one adds labels that recur in no other view.
 ITERATIONS = 1
 # Classes and words are counted from 0 alike: one bit keeps an object from being a feature.
 _OBJECT_BIT = np.uint32(1 << 31)
