@@ -1,4 +1,4 @@
-"""Put the rows of results.json as a table into docs/results/benchmarks.md: python -m benchmarks.table."""
+"""Put the rows of results.json as a table into docs/results: python -m benchmarks.table."""
 
 import json
 from pathlib import Path
