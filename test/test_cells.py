@@ -14,7 +14,8 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames import cells as cells_module
 from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
-from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key, make_row
+from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
+from adversarial_lcd_ros.evaluation.frames.rows import make_row
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 from adversarial_lcd_ros.evaluation.store import CELLS, open_store, read_cells
 

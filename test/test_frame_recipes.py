@@ -4,7 +4,7 @@ import pytest
 
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
-from adversarial_lcd_ros.evaluation.recipes import load_recipe
+from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 
 
 def written(tmp_path, text):

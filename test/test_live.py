@@ -14,10 +14,10 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation.recipes import load_recipe
 from adversarial_lcd_ros.evaluation.replay import run as live
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
+from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
 from adversarial_lcd_ros.paths import share_path
 

@@ -10,10 +10,12 @@ from rich.console import Console
 
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import results, wording
-from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
+from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay import report, tables
+from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     make_records,
@@ -281,7 +283,7 @@ def test_json_has_no_nan(tmp_path):
 
 
 def test_environment_names_what_figures_depend_on():
-    found = results.environment()
+    found = environment()
     assert found['python']
     assert found['versions']['numpy']
     assert found['versions']['opencv']

@@ -19,9 +19,10 @@ from adversarial_lcd_ros.errors import (
     SequenceError,
 )
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.training import run as training_run
 from adversarial_lcd_ros.training.run import TrainingPlan, train
-from adversarial_lcd_ros.training.sources import TrainingSource, with_licences
+from adversarial_lcd_ros.training.sources import one_licence_each
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 LAP, PERIOD_NS = 20, 500_000_000
@@ -58,7 +59,7 @@ def tour(tmp_path_factory):
 @pytest.fixture(scope='module')
 def trained(tour, tmp_path_factory):
     output = tmp_path_factory.mktemp('trained') / 'models'
-    return output, train([TrainingSource(tour)], output, plan=PLAN)
+    return output, train([SequencePart(tour)], output, plan=PLAN)
 
 
 def test_all_artefacts_are_there_and_load(trained):
@@ -89,13 +90,13 @@ def test_the_card_says_what_was_trained_on(trained):
 
 def test_same_seed_same_bytes(tour, trained, tmp_path):
     output, _ = trained
-    train([TrainingSource(tour)], tmp_path / 'again', plan=PLAN)
+    train([SequencePart(tour)], tmp_path / 'again', plan=PLAN)
     for path in output.iterdir():
         assert path.read_bytes() == (tmp_path / 'again' / path.name).read_bytes(), path.name
 
 
 def test_another_seed_is_another_vocabulary(tour, trained, tmp_path):
-    train([TrainingSource(tour)], tmp_path / 'other', seed=7, plan=PLAN)
+    train([SequencePart(tour)], tmp_path / 'other', seed=7, plan=PLAN)
     assert ((tmp_path / 'other/vocabulary.npz').read_bytes()
             != (trained[0] / 'vocabulary.npz').read_bytes())
 
@@ -124,7 +125,7 @@ def test_overwrite_replaces_artefacts_and_nothing_else(tour, tmp_path):
     output.mkdir()
     (output / 'target_edges.json').write_text('of an earlier training')
     (output / 'notes.txt').write_text('mine')
-    train([TrainingSource(tour)], output, plan=PLAN, overwrite=True)
+    train([SequencePart(tour)], output, plan=PLAN, overwrite=True)
     assert (output / 'notes.txt').read_text() == 'mine'
     assert not (output / 'target_edges.json').exists()
     assert (output / 'MODEL_CARD.json').exists()
@@ -132,19 +133,19 @@ def test_overwrite_replaces_artefacts_and_nothing_else(tour, tmp_path):
 
 def without_truth(tour, tmp_path):
     folder = make.tum_folder(tmp_path / 'blind', truth=False)
-    return [TrainingSource(folder)], PLAN
+    return [SequencePart(folder)], PLAN
 
 
 def first_lap(tour, tmp_path):
-    return [TrainingSource(tour, 0.0, 0.5)], PLAN
+    return [SequencePart(tour, 0.0, 0.5)], PLAN
 
 
 def no_frame(tour, tmp_path):
-    return [TrainingSource(tour, 0.0, 0.01)], PLAN
+    return [SequencePart(tour, 0.0, 0.01)], PLAN
 
 
 def many_words(tour, tmp_path):
-    return [TrainingSource(tour)], TrainingPlan(PLAN.builder, depth=4)
+    return [SequencePart(tour)], TrainingPlan(PLAN.builder, depth=4)
 
 
 @pytest.mark.parametrize(('case', 'kind', 'message'), [
@@ -165,13 +166,13 @@ def test_a_network_without_pytorch_is_refused_before_the_work(tour, tmp_path, mo
     monkeypatch.setitem(sys.modules, 'torch', None)
     monkeypatch.setattr(training_run, 'open_source', None)
     with pytest.raises(ModelError, match=r'pip install "adversarial_lcd_ros\[gnn\]"'):
-        train([TrainingSource(tour)], tmp_path / 'models', plan=TrainingPlan(targets=('gnn',)))
+        train([SequencePart(tour)], tmp_path / 'models', plan=TrainingPlan(targets=('gnn',)))
 
 
 @pytest.mark.parametrize(('text', 'part'), [
     ('a/b', (0.0, 1.0)), ('a/b@0:0.5', (0.0, 0.5)), ('a@b@.25:1', (0.25, 1.0))])
 def test_parts_are_read(text, part):
-    source = TrainingSource.parse(text)
+    source = SequencePart.parse(text)
     assert (source.start, source.stop) == part
     assert '@' not in source.path.name or source.path.name == 'a@b'
 
@@ -180,12 +181,12 @@ def test_parts_are_read(text, part):
                                   'a@nan:1'])
 def test_wrong_parts_are_refused(text):
     with pytest.raises(SequenceError, match=r'such as .*0:0\.5'):
-        TrainingSource.parse(text)
+        SequencePart.parse(text)
 
 
 def test_an_existing_path_may_hold_an_at(tmp_path):
     (tmp_path / 'tour@0:0.5').mkdir()
-    assert TrainingSource.parse(str(tmp_path / 'tour@0:0.5')).stop == 1.0
+    assert SequencePart.parse(str(tmp_path / 'tour@0:0.5')).stop == 1.0
 
 
 @pytest.mark.parametrize('wrong', [
@@ -198,8 +199,8 @@ def test_a_plan_is_checked(wrong):
 
 
 def test_licences_are_one_for_each_sequence():
-    source = TrainingSource.parse('tour')
-    assert with_licences([source], ['CC0'])[0].licence == 'CC0'
-    assert with_licences([source], []) == [source]
+    source = SequencePart.parse('tour')
+    assert one_licence_each([source], ['CC0']) == ['CC0']
+    assert one_licence_each([source], []) == ['']
     with pytest.raises(SequenceError, match='2 licences for 1 sequences'):
-        with_licences([source], ['CC0', 'CC BY 4.0'])
+        one_licence_each([source], ['CC0', 'CC BY 4.0'])

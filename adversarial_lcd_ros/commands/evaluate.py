@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 import sys
 
-from adversarial_lcd_ros.commands import sweep
+from adversarial_lcd_ros.commands import evaluate_frames
 from adversarial_lcd_ros.commands.common import TABLE_WIDTH, Commands, add_command, tell
 from adversarial_lcd_ros.config import (
     AttackConfig,
@@ -43,7 +43,7 @@ def add(commands: Commands) -> None:
                         'of the protocol "frames" any number of bags or folders, also parts of '
                         'them (PATH@FROM:TO, PATH@0.5:1 is the second half)')
     _add_evaluation_options(parser, 'SEQUENCE [SEQUENCE ...] [OPTIONS]')
-    sweep.add_options(parser)
+    evaluate_frames.add_options(parser)
 
 
 def add_demo(commands: Commands) -> None:
@@ -84,9 +84,9 @@ def _evaluate(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 
     if read_recipe(options.recipe)[1]['protocol'] == FRAMES:
-        sweep.run(options)
+        evaluate_frames.run(options)
         return
-    sweep.refuse_options(options)
+    evaluate_frames.refuse_options(options)
     if len(options.sources) != 1:
         raise ConfigError(f'recipe {options.recipe} replays one bag, found '
                           f'{len(options.sources)}: name one, or a recipe of the protocol '
@@ -103,7 +103,7 @@ def _demo(options: Namespace) -> None:
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
     from rich.console import Console
 
-    from adversarial_lcd_ros.evaluation.recipes import load_recipe
+    from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
     from adversarial_lcd_ros.evaluation.replay.tables import (
         decline_table,

@@ -48,16 +48,15 @@ def add(commands: Commands) -> None:
 
 
 def _train(options: Namespace) -> None:
+    from adversarial_lcd_ros.sequences.part import SequencePart
     from adversarial_lcd_ros.training.run import (
         DEFAULT_TARGETS,
         TRAINING_LABELS,
         TrainingPlan,
         train,
     )
-    from adversarial_lcd_ros.training.sources import TrainingSource, with_licences
 
-    sources = with_licences([TrainingSource.parse(text) for text in options.sequences],
-                            options.licence)
+    sources = [SequencePart.parse(text) for text in options.sequences]
     builder = config_from_options(options, BuilderConfig)
     if options.vocabulary:
         builder = replace(builder, vocabulary=str(options.vocabulary))
@@ -67,7 +66,8 @@ def _train(options: Namespace) -> None:
         tuple(options.targets or DEFAULT_TARGETS), options.pairs, options.vocabulary_stride,
         flips_per_frame=options.flips_per_frame)
     card = train(sources, options.output, seed=options.seed, plan=plan, stage=progress_bar,
-                 overwrite=options.overwrite, command_line=['adversarial-lcd', *sys.argv[1:]])
+                 overwrite=options.overwrite, command_line=['adversarial-lcd', *sys.argv[1:]],
+                 licences=options.licence)
     for target, trained in card['targets'].items():
         accuracy = ', '.join(f'{pairs["balanced_accuracy"]:.3f} of {sequence["name"]}'
                              for sequence, pairs in zip(card['sequences'],

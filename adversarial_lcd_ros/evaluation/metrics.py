@@ -21,6 +21,8 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 Outcomes = NDArray[np.str_]
+# What ground truth says of a frame, in words; only the first two are scored.
+FRAME_KINDS = ('positive', 'negative', 'between', 'no_candidate', 'no_ground_truth')
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,54 +1,18 @@
-"""Recipes: the attacks of an evaluation, in small YAML files."""
+"""Recipes: what an evaluation does, in small YAML files; each kind reads on in its own room."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.paths import share_path
 
 FOLDER = 'config/recipes'
 # Every frame through the nodes, or a sample of frames without ROS (``frames``).
 LIVE, FRAMES = 'live', 'frames'
-
-
-def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
-    """
-    Return the attacks of a recipe by name, in its order.
-
-    Parameters
-    ----------
-    name : str
-        A recipe that ships, or the path of a YAML file like those in config/recipes.
-    overrides : mapping
-        Settings that win over those of every attack in the recipe.
-
-    Raises
-    ------
-    ConfigError
-        There is no such recipe, or it is not of the expected form.
-
-    """
-    path, content = read_recipe(name)
-    if content.pop('protocol') != LIVE:
-        raise ConfigError(f'recipe {path} is for whole evaluations: "adversarial-lcd evaluate '
-                          'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
-    if set(content) != {'attacks'}:
-        raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
-    attacks: dict[str, AttackConfig] = {}
-    for entry in content['attacks']:
-        if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
-            raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
-        title = entry.pop('name')
-        if title in attacks or title == 'clean':
-            raise ConfigError(f'recipe {path}: the name {title!r} is taken')
-        attacks[title] = AttackConfig.from_mapping({**entry, **overrides})
-    return attacks
 
 
 def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
@@ -58,7 +22,7 @@ def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
     Parameters
     ----------
     name : str
-        As in ``load_recipe``.
+        A recipe that ships, or the path of a YAML file like those in config/recipes.
 
     Raises
     ------
@@ -66,18 +30,35 @@ def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
         There is no such recipe, or it has no attacks, or a protocol that is not known.
 
     """
-    path = find_recipe(name)
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
-    entries = content.get('attacks') if isinstance(content, dict) else None
+    path, content = load_yaml(name)
+    entries = content.get('attacks')
     if not isinstance(entries, list) or not entries:
         raise ConfigError(f'recipe {path}: expected a list "attacks"')
     protocol = content.setdefault('protocol', LIVE)
     if protocol not in (LIVE, FRAMES):
         raise ConfigError(f'recipe {path}: the protocol is {protocol!r}: expected "{LIVE}" '
                           f'(every frame, through the nodes) or "{FRAMES}" (a sample of frames)')
+    return path, content
+
+
+def load_yaml(name: str) -> tuple[Path, dict[str, Any]]:
+    """
+    Return the path of a recipe and what is in it.
+
+    Raises
+    ------
+    ConfigError
+        There is no such recipe, or it is not made of names and values.
+
+    """
+    path = find_recipe(name)
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
+    if not isinstance(content, dict):
+        raise ConfigError(f'recipe {path} holds a {type(content).__name__}: expected lists by '
+                          'name, such as "attacks" or "sequences"')
     return path, content
 
 

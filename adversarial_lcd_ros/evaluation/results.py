@@ -5,30 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
-from importlib import metadata
 import json
-import math
-import os
 from pathlib import Path
-import platform
 from typing import Any
 
-import cv2
-
 from adversarial_lcd_ros.config import Config
+from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.files import write_json
 
 SUMMARY, RECORDS, REPORT = 'summary.json', 'per_query.csv', 'report.html'
 CONFIGURATION, ENVIRONMENT, PICTURES = 'configuration.json', 'environment.json', 'pictures'
 LATEST = 'latest'
 _PARTIAL = '.partial'
-# Distributions by the name that is shown; the first that is installed counts.
-_DISTRIBUTIONS = {
-    'adversarial_lcd_ros': ('adversarial-lcd-ros', 'adversarial_lcd_ros'),
-    'numpy': ('numpy',), 'scipy': ('scipy',), 'scikit-learn': ('scikit-learn',),
-    'onnxruntime': ('onnxruntime', 'onnxruntime-gpu'), 'rosbags': ('rosbags',),
-    'mcap': ('mcap',), 'rclpy': ('ros-jazzy-rclpy', 'rclpy'), 'matplotlib': ('matplotlib',)}
-
 
 class ResultsFolder:
     """
@@ -69,8 +58,7 @@ class ResultsFolder:
 
     def write_json(self, name: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
         """Write a JSON file; what is not a finite number becomes null."""
-        text = json.dumps(_plain(values), indent=2, allow_nan=False)
-        (self.path / name).write_text(text + '\n', encoding='utf-8')
+        write_json(self.path / name, values)
 
     def write_setup(self, sections: Sequence[Config], command_line: Sequence[str], seed: int,
                     extra: Mapping[str, Any] | None = None) -> None:
@@ -122,48 +110,6 @@ def _new_folder(root: Path, name: str) -> Path:
             except FileExistsError:
                 pass  # taken by another process: try the next number
         number += 1
-
-
-def environment() -> dict[str, Any]:
-    """Return versions and machine; null: not installed."""
-    versions = {name: _version(distributions) for name, distributions in _DISTRIBUTIONS.items()}
-    return {'time_utc': datetime.now(timezone.utc).isoformat(timespec='seconds'),
-            'python': platform.python_version(), 'versions': {**versions,
-                                                              'opencv': cv2.__version__},
-            'rmw_implementation': os.environ.get('RMW_IMPLEMENTATION'),
-            'system': platform.platform(), 'machine': platform.machine(),
-            'processor': _processor(), 'cores': os.cpu_count()}
-
-
-def _version(distributions: Sequence[str]) -> str | None:
-    for name in distributions:
-        try:
-            return metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return None
-
-
-def _processor() -> str | None:
-    information = Path('/proc/cpuinfo')
-    if not information.is_file():
-        return platform.processor() or None
-    lines = information.read_text(encoding='utf-8', errors='replace').splitlines()
-    names = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
-    return names[0] if names else None
-
-
-def _plain(value: Any) -> Any:
-    # numpy scalars to Python's, NaN and infinity to None.
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
-    if hasattr(value, 'item') and not isinstance(value, (str, bytes)):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def read_json(path: Path) -> dict[str, Any]:

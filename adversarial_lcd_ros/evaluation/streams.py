@@ -15,7 +15,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames
 from adversarial_lcd_ros.sequences import open_sequence
-from adversarial_lcd_ros.training.sources import TrainingSource
+from adversarial_lcd_ros.sequences.part import SequencePart
 
 _KEPT = 6
 
@@ -120,7 +120,7 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
 
 
 def _for_source(source: str, builder: BuilderConfig) -> BuilderConfig:
-    path = TrainingSource.parse(source).path
+    path = SequencePart.parse(source).path
     if builder.detector == 'onnx' and not holds_graphs(path) and open_sequence(path).detections:
         return replace(builder, detector='csv')
     return builder

@@ -16,8 +16,8 @@ from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, Progress,
 from adversarial_lcd_ros.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.importing import pose_messages
+from adversarial_lcd_ros.sequences.part import SequencePart, terms_of
 from adversarial_lcd_ros.sequences.replay import payload_schemas
-from adversarial_lcd_ros.training.sources import TrainingSource, terms_of
 
 # What the detector hears, and what goes to an attacker first.
 GRAPH_TOPIC, CLEAN_TOPIC = '/graph', '/graph_clean'
@@ -66,7 +66,7 @@ def build_graph_bag(source: str, destination: Path, config: BuilderConfig, *,
             'source': source, 'name': found.name, 'settings': asdict(config),
             'version': __version__}))
         poses = write_graphs(bag, found)
-        path = TrainingSource.parse(source).path
+        path = SequencePart.parse(source).path
         for name in terms_of(path) if path.is_dir() else ():
             bag.attach(path / name)
     return GraphBagSummary(destination, found, poses,

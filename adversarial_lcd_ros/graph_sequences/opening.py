@@ -21,8 +21,8 @@ from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, PAYLO
 from adversarial_lcd_ros.sequences.bags import bag_trajectory
 from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
+from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.sequences.replay import Replay, read_payloads
-from adversarial_lcd_ros.training.sources import TrainingSource
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 FRAMES_AT_ONCE = 2
@@ -88,7 +88,7 @@ def open_graphs(source: str, config: BuilderConfig | None = None, cache: Path | 
         The cache cannot be written.
 
     """
-    part = TrainingSource.parse(source)
+    part = SequencePart.parse(source)
     if holds_graphs(part.path):
         return _recorded_graphs(part)
     sequence = open_sequence(part.path)
@@ -209,7 +209,7 @@ def holds_graphs(path: Path) -> bool:
         return not bag.of_type(IMAGE, COMPRESSED_IMAGE) and bool(bag.of_type(PAYLOAD))
 
 
-def _recorded_graphs(part: TrainingSource) -> GraphSequence:
+def _recorded_graphs(part: SequencePart) -> GraphSequence:
     """Return the graphs of a bag without images."""
     topic, = Replay(part.path, ReplayConfig()).frame_topics
     graphs = [decode_graph(payload) for _, payload in read_payloads(part.path, topic)]

@@ -19,6 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
+from adversarial_lcd_ros.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, join_ns
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 IMAGE, COMPRESSED_IMAGE = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 POSE = 'geometry_msgs/msg/PoseStamped'
-PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
+PAYLOAD = WIRE_TYPE
 TF = 'tf2_msgs/msg/TFMessage'
 # What /tf was called before tf2, as in the bags of the TUM RGB-D benchmark.
 OLD_TF = ('tf/msg/tfMessage', 'tf/msg/TFMessage')

@@ -12,9 +12,9 @@ import numpy as np
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 
-PAYLOAD_TYPE = 'std_msgs/msg/UInt8MultiArray'
 _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
     'MultiTierGraph': codec.decode_graph,
     'LoopClosure': codec.decode_loop_closure,
@@ -26,7 +26,7 @@ _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
 
 
 @dataclass(frozen=True)
-class GraphStatistics:
+class GraphSizes:
     """
     Sizes of graphs.
 
@@ -42,7 +42,7 @@ class GraphStatistics:
     objects: tuple[float, float, float]
 
     @classmethod
-    def of(cls, graphs: Iterable[MultiTierGraph]) -> GraphStatistics:
+    def of(cls, graphs: Iterable[MultiTierGraph]) -> GraphSizes:
         """Return the statistics of at least one graph; none of them is kept."""
         sizes = np.array([(graph.node_count, graph.edge_count, graph.object_count)
                           for graph in graphs], np.float64)
@@ -59,7 +59,7 @@ class TopicSummary:
     ----------
     payload : str
         Message of msg_schemas that its byte arrays hold; '' if none.
-    graphs : GraphStatistics or None
+    graphs : GraphSizes or None
         Of all graphs of the topic, where it carries graphs.
 
     """
@@ -68,7 +68,7 @@ class TopicSummary:
     type: str
     count: int
     payload: str = ''
-    graphs: GraphStatistics | None = None
+    graphs: GraphSizes | None = None
 
 
 @dataclass(frozen=True)
@@ -99,12 +99,12 @@ def inspect_bag(path: Path) -> BagSummary:
 
 def _topic(bag: BagFile, name: str) -> TopicSummary:
     kind, count = bag.topics[name], bag.counts[name]
-    if kind != PAYLOAD_TYPE or not count:
+    if kind != WIRE_TYPE or not count:
         return TopicSummary(name, kind, count)
     payload, _ = identify_payload(next(_payloads(bag, name)))
     if payload != 'MultiTierGraph':
         return TopicSummary(name, kind, count, payload)
-    statistics = GraphStatistics.of(codec.decode_graph(data) for data in _payloads(bag, name))
+    statistics = GraphSizes.of(codec.decode_graph(data) for data in _payloads(bag, name))
     return TopicSummary(name, kind, count, payload, statistics)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
-from adversarial_lcd_ros.training.sources import TrainingSource
+from adversarial_lcd_ros.sequences.part import SequencePart
 
 MODEL_CARD = 'MODEL_CARD.json'
 _TARGET, _NETWORK = 'target_{}.json', 'target_{}.onnx'
@@ -115,7 +115,7 @@ def trained_on(decision: Path, source: str,
         sequences = [(entry['name'], *entry['part']) for entry in json.loads(text)['sequences']]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    part = TrainingSource.parse(source)
+    part = SequencePart.parse(source)
     length = part.stop - part.start
     begin, end = (part.start + length * fraction for fraction in scored)
     name = part.path.resolve().stem

@@ -17,11 +17,12 @@ from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation.results import environment
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
+from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.training.decisions import (
     TrainingSequence,
     collect_surrogate_data,
@@ -38,7 +39,7 @@ from adversarial_lcd_ros.training.model_folder import (
 from adversarial_lcd_ros.training.pair_scores import Progress
 from adversarial_lcd_ros.training.sources import (
     TrainingFrames,
-    TrainingSource,
+    one_licence_each,
     open_source,
 )
 from adversarial_lcd_ros.vision.builder import GraphBuilder
@@ -117,9 +118,9 @@ def silent(_: str) -> Iterator[Progress]:
     yield lambda _done, _total: None
 
 
-def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
+def train(sources: Sequence[SequencePart], output: Path, *, seed: int = 42,
           plan: TrainingPlan | None = None, stage: Stage = silent, overwrite: bool = False,
-          command_line: Sequence[str] = ()) -> dict[str, Any]:
+          command_line: Sequence[str] = (), licences: Sequence[str] = ()) -> dict[str, Any]:
     """
     Train vocabulary, decisions and surrogate data, and return their card.
 
@@ -129,7 +130,7 @@ def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
 
     Parameters
     ----------
-    sources : sequence of TrainingSource
+    sources : sequence of SequencePart
         At least one; the surrogate data come from the first.
     output : Path
         Folder of the artefacts.
@@ -143,11 +144,13 @@ def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
         Replace the artefacts of an earlier training.
     command_line : sequence of str, optional
         For the card.
+    licences : sequence of str, optional
+        Of the pictures of each sequence, in their order, for the card.
 
     Raises
     ------
     SequenceError
-        A sequence cannot be read, or has no ground truth.
+        A sequence cannot be read, or has no ground truth; or licences are not one for each.
     EvaluationError
         A sequence has no loops, no different places, or is too short. Found before the work.
     ModelError
@@ -157,7 +160,7 @@ def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
     """
     plan = plan or TrainingPlan()
     with model_folder(output, overwrite=overwrite) as work:
-        opened = _open_all(sources, plan)
+        opened = _open_all(sources, licences, plan)
         vocabulary = _write_vocabulary(opened, plan, seed, work / VOCABULARY, stage)
         builder = replace(plan.builder, vocabulary=str(work / VOCABULARY))
         sequences = [_build_graphs(source, builder, stage) for source in opened]
@@ -176,13 +179,15 @@ def train(sources: Sequence[TrainingSource], output: Path, *, seed: int = 42,
     return card
 
 
-def _open_all(sources: Sequence[TrainingSource], plan: TrainingPlan) -> list[TrainingFrames]:
+def _open_all(sources: Sequence[SequencePart], licences: Sequence[str],
+              plan: TrainingPlan) -> list[TrainingFrames]:
     """Open and check everything before the first minute of work."""
     if not sources:
         raise EvaluationError('no sequence to train on: expected at least one')
     if GnnTarget.name in plan.targets:
         require_pytorch()
-    opened = [open_source(source) for source in sources]
+    opened = [open_source(source, licence) for source, licence in
+              zip(sources, one_licence_each(sources, licences), strict=True)]
     for source in opened:
         source.check_labels(plan.labels)
     stamps = opened[0].stamps_ns

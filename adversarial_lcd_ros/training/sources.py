@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
-import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,79 +13,7 @@ from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, label_frames
 from adversarial_lcd_ros.sequences import Frame, Trajectory, open_sequence
 from adversarial_lcd_ros.sequences import Sequence as FrameSequence
-
-_PART = re.compile(r'(?P<path>.+)@(?P<start>[0-9]*\.?[0-9]+):(?P<stop>[0-9]*\.?[0-9]+)')
-# What the files are called that say what one may do with the pictures.
-_TERMS = ('credits', 'license', 'licence')
-
-
-@dataclass(frozen=True)
-class TrainingSource:
-    """
-    A sequence, or a block of it in time, as the user named it.
-
-    Attributes
-    ----------
-    path : Path
-        What ``open_sequence`` opens.
-    start, stop : float
-        From and to which fraction of the frames, 0 <= start < stop <= 1. Parts that share an
-        end share no frame: one can be trained on, the other tested on.
-    licence : str
-        Licence of the pictures, for the model card; '' where it is not given.
-
-    Raises
-    ------
-    SequenceError
-        The fractions are no part.
-
-    """
-
-    path: Path
-    start: float = 0.0
-    stop: float = 1.0
-    licence: str = ''
-
-    def __post_init__(self) -> None:
-        """Check the part."""
-        if not 0 <= self.start < self.stop <= 1:
-            raise SequenceError(f'part {self.start:g}:{self.stop:g} of {self.path}: expected '
-                                '0 <= FROM < TO <= 1, such as 0:0.5 for the first half')
-
-    @classmethod
-    def parse(cls, text: str) -> TrainingSource:
-        """
-        Read ``PATH`` or ``PATH@FROM:TO``; a path that exists may hold an @ of its own.
-
-        Raises
-        ------
-        SequenceError
-            What follows the @ is no part.
-
-        """
-        if '@' not in text or Path(text).exists():
-            return cls(Path(text))
-        found = _PART.fullmatch(text)
-        if not found:
-            raise SequenceError(f'there is no sequence {text}; a part of one is asked for as '
-                                'PATH@FROM:TO, such as PATH@0:0.5 for the first half')
-        return cls(Path(found['path']), float(found['start']), float(found['stop']))
-
-    def numbers(self, frame_count: int) -> range:
-        """
-        Return which of the frames of the sequence belong to the part.
-
-        Raises
-        ------
-        SequenceError
-            None does.
-
-        """
-        numbers = range(int(frame_count * self.start), int(frame_count * self.stop))
-        if not numbers:
-            raise SequenceError(f'part {self.start:g}:{self.stop:g} of {self.path}, which has '
-                                f'{frame_count} frames, holds none: expected a larger part')
-        return numbers
+from adversarial_lcd_ros.sequences.part import SequencePart, terms_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +23,7 @@ class TrainingFrames:
 
     Attributes
     ----------
-    source : TrainingSource
+    source : SequencePart
     sequence : adversarial_lcd_ros.sequences.Sequence
         The whole of it.
     trajectory : Trajectory
@@ -106,14 +32,17 @@ class TrainingFrames:
         The frames to train on.
     terms : tuple of str
         Names of the files with credits or a licence beside the frames.
+    stated_licence : str
+        What the user says of the licence of the pictures; '' for nothing.
 
     """
 
-    source: TrainingSource
+    source: SequencePart
     sequence: FrameSequence
     trajectory: Trajectory
     numbers: range
     terms: tuple[str, ...]
+    stated_licence: str = ''
 
     @property
     def name(self) -> str:
@@ -126,8 +55,8 @@ class TrainingFrames:
     @property
     def licence(self) -> str:
         """Return the licence that was given, or where one is found, or that none is known."""
-        if self.source.licence:
-            return self.source.licence
+        if self.stated_licence:
+            return self.stated_licence
         return f'see {", ".join(self.terms)} of the sequence' if self.terms else 'not stated'
 
     @property
@@ -161,7 +90,7 @@ class TrainingFrames:
                 f'or set labels (min_gap_s is {labels.min_gap_s:g} s)')
 
 
-def open_source(source: TrainingSource) -> TrainingFrames:
+def open_source(source: SequencePart, licence: str = '') -> TrainingFrames:
     """
     Open a sequence to train on.
 
@@ -177,12 +106,12 @@ def open_source(source: TrainingSource) -> TrainingFrames:
                             'loops; put a groundtruth.txt beside the frames, or import the '
                             'sequence with --ground-truth')
     return TrainingFrames(source, sequence, sequence.trajectory,
-                          source.numbers(sequence.frame_count), terms_of(source.path))
+                          source.numbers(sequence.frame_count), terms_of(source.path), licence)
 
 
-def with_licences(sources: list[TrainingSource], licences: list[str]) -> list[TrainingSource]:
+def one_licence_each(sources: Sequence[SequencePart], licences: Sequence[str]) -> list[str]:
     """
-    Return the sources, each with its licence in the order given.
+    Return the licence of each source in their order, '' where none is given.
 
     Raises
     ------
@@ -190,17 +119,7 @@ def with_licences(sources: list[TrainingSource], licences: list[str]) -> list[Tr
         There are licences, but not one for each source.
 
     """
-    if not licences:
-        return sources
-    if len(licences) != len(sources):
+    if licences and len(licences) != len(sources):
         raise SequenceError(f'{len(licences)} licences for {len(sources)} sequences: expected '
                             'one for each, in their order, or none')
-    return [replace(source, licence=licence)
-            for source, licence in zip(sources, licences, strict=True)]
-
-
-def terms_of(path: Path) -> tuple[str, ...]:
-    """Return the names of the files with credits or a licence beside the frames, sorted."""
-    folder = path if path.is_dir() else path.parent
-    return tuple(sorted(file.name for file in folder.iterdir()
-                        if file.is_file() and file.stem.lower() in _TERMS))
+    return list(licences) or [''] * len(sources)

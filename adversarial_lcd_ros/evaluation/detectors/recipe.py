@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
 from adversarial_lcd_ros.config import TARGETS, BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.recipes import find_recipe
+from adversarial_lcd_ros.evaluation.recipes import load_yaml
 
 ConfigT = TypeVar('ConfigT', bound=Config)
 _KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels')
@@ -79,12 +77,8 @@ def recipe_sequences(name: str, data: Path, choices: Choices) -> list[TargetSequ
         There is no such recipe or folder, or it is not of the expected form.
 
     """
-    path = find_recipe(name)
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
-    entries = content.get('sequences') if isinstance(content, dict) else None
+    path, content = load_yaml(name)
+    entries = content.get('sequences')
     if not isinstance(entries, list) or not entries or set(content) != {'sequences'}:
         raise ConfigError(f'recipe {path}: expected a list "sequences" and nothing else')
     if not data.is_dir():

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.frames.cells import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
 from adversarial_lcd_ros.evaluation.metrics import (
     Metrics,
     first_closure_latency_s,

@@ -24,7 +24,7 @@ from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs
 from adversarial_lcd_ros.sequences import open_sequence
-from adversarial_lcd_ros.training.sources import TrainingSource
+from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.vision.draw import draw_attack
 
 PICTURES = 6
@@ -135,7 +135,7 @@ def _picture(stream: Stream, row: Row, frame: dict[str, Any], found: FrameResult
 
 
 def _image(stream: Stream, graph: MultiTierGraph) -> NDArray[np.uint8]:
-    path = TrainingSource.parse(stream.graphs.source).path
+    path = SequencePart.parse(stream.graphs.source).path
     if stream.graphs.builder.detector == 'csv' or holds_graphs(path):
         return np.full((graph.height, graph.width, 3), _BLANK_GREY, np.uint8)
     frames = open_sequence(path).frames(graph.sequence, graph.sequence + 1)

@@ -19,14 +19,15 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.evaluation.frames.attacked import (
     FrameSample,
     attack_frames,
     sample_frames,
 )
-from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key, make_row
+from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
-from adversarial_lcd_ros.evaluation.results import environment
+from adversarial_lcd_ros.evaluation.frames.rows import make_row
 from adversarial_lcd_ros.evaluation.store import CellStore
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.workers import Run

@@ -11,6 +11,7 @@ from typing import Any
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.summaries import Cell, Row
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
+from adversarial_lcd_ros.files import write_text
 
 SUMMARY, CELLS_CSV, SUMMARY_CSV, TABLES_TEX = (
     'summary.json', 'cells.csv', 'summary.csv', 'tables.tex')
@@ -53,13 +54,6 @@ def write_exports(folder: Path, rows: Iterable[Row], cells: Sequence[Cell],
     _write_csv(folder / SUMMARY_CSV, flat)
     _write_csv(folder / CELLS_CSV, plain)
     return [folder / name for name in (SUMMARY, SUMMARY_CSV, CELLS_CSV, TABLES_TEX)]
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file that is there whole or not at all."""
-    draft = path.with_name(f'.{path.name}.partial')
-    draft.write_text(text, encoding='utf-8')
-    draft.replace(path)
 
 
 def latex_escape(text: str) -> str:

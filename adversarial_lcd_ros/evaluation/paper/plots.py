@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.evaluation.page import GRID, INK, NARROW, STYLE, svg
 from adversarial_lcd_ros.evaluation.paper.ranks import RankedMethod, Ranking
 from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
-from adversarial_lcd_ros.evaluation.replay.plots import GRID, INK, NARROW, STYLE, svg
 
 _COLOURS = {'eigencentrality': '#2f5d8a', 'recall': '#c0392b', 'random_walk': '#d08700',
             'shortest_path': '#2e8064', 'random_flip': '#7a4a9c', OPTIMUM: INK}

@@ -14,9 +14,10 @@ from typing import Any
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals, wording
+from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
-from adversarial_lcd_ros.evaluation.paper.exports import write_exports, write_text
+from adversarial_lcd_ros.evaluation.paper.exports import write_exports
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
 from adversarial_lcd_ros.evaluation.paper.summaries import (
@@ -28,9 +29,8 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
-from adversarial_lcd_ros.evaluation.replay import plots
-from adversarial_lcd_ros.evaluation.replay.report import data_uri, load_template
 from adversarial_lcd_ros.evaluation.results import REPORT
+from adversarial_lcd_ros.files import write_text
 
 TABLES_MD = 'tables.md'
 _PICTURES = 6
@@ -124,9 +124,9 @@ def _plots(rows: Sequence[Row], cells: Sequence[Cell], groups: Sequence[list[Dec
     return values
 
 
-def _plot(draw: Callable[[float], bytes], wide: float = plots.WIDE) -> Plot:
+def _plot(draw: Callable[[float], bytes], wide: float = WIDE) -> Plot:
     return {name: data_uri(draw(width), 'svg+xml')
-            for name, width in (('wide', wide), ('narrow', plots.NARROW))}
+            for name, width in (('wide', wide), ('narrow', NARROW))}
 
 
 def _blocks(tables: Sequence[DeclineTable]) -> list[dict[str, Any]]:
@@ -136,7 +136,7 @@ def _blocks(tables: Sequence[DeclineTable]) -> list[dict[str, Any]]:
         beside = not blocks and len(table.columns) < _MANY_COLUMNS
         plot = None if table.ranking is None else _plot(
             partial(paper_plots.critical_difference, table.ranking),
-            _BESIDE if beside else plots.WIDE)
+            _BESIDE if beside else WIDE)
         blocks.append({'table': table, 'verdict': verdicts.verdict(table), 'plot': plot,
                        'beside': beside})
     return blocks

@@ -22,8 +22,7 @@ from scipy import stats
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.metrics import right
-from adversarial_lcd_ros.evaluation.replay.summary import KINDS
+from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
@@ -36,7 +35,7 @@ USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
           'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
           'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
-_KINDS = dict(zip(KINDS, (POSITIVE, NEGATIVE, 0, 0, 0), strict=True))
+_KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
 Row = Mapping[str, Any]
@@ -207,7 +206,7 @@ def _kinds(row: Row) -> NDArray[np.int8]:
     strange = [kind for kind in kinds if kind not in (POSITIVE, NEGATIVE, 0)]
     if strange:
         raise EvaluationError(f'{row["sequence"]}: a frame of kind {strange[0]!r}: expected one '
-                              f'of {", ".join(KINDS)}')
+                              f'of {", ".join(FRAME_KINDS)}')
     return np.array(kinds, np.int8)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import io
 from typing import Any
 
 import matplotlib
@@ -11,29 +10,16 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.evaluation.page import CLEAN_COLOUR, GRID, STYLE, attack_colour, svg
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
 from adversarial_lcd_ros.evaluation.replay.summary import run_metrics
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
-CLEAN_COLOUR = '#2f5d8a'
-ATTACK_COLOURS = ('#c0392b', '#d08700', '#7a4a9c', '#2e8064', '#8c564b', '#5f6b73')
-_LOOP_SHADE, _NEW_SHADE, INK, GRID = '#dcebd9', '#e9e9ee', '#33373d', '#dddfe3'
-STYLE = {
-    'font.family': 'DejaVu Sans', 'font.size': 9.0, 'axes.edgecolor': '#9aa0a8',
-    'axes.labelcolor': INK, 'text.color': INK, 'xtick.color': INK, 'ytick.color': INK,
-    'axes.spines.top': False, 'axes.spines.right': False, 'axes.linewidth': 0.8,
-    'xtick.major.size': 3.0, 'ytick.major.size': 3.0, 'legend.frameon': False,
-    'svg.hashsalt': 'adversarial_lcd_ros'}
-WIDE, NARROW = 9.4, 4.4  # inches: for a desktop, and for a phone held upright
+_LOOP_SHADE, _NEW_SHADE = '#dcebd9', '#e9e9ee'
 _ROW_HEIGHT = 1.7
 _Y_LIMITS = (-0.03, 1.15)  # above 1 is room for the marks
 
 Run = tuple[str, Sequence[QueryRecord]]
-
-
-def attack_colour(index: int) -> str:
-    """Return the colour of an attack by its place in the tables."""
-    return ATTACK_COLOURS[index % len(ATTACK_COLOURS)]
 
 
 def precision_recall(clean: Sequence[QueryRecord], attacks: Sequence[Run]) -> bytes | None:
@@ -123,10 +109,3 @@ def _mark(panel: Any, time_s: NDArray[np.float64], effects: NDArray[np.str_],
         chosen = np.isin(effects, names)
         panel.plot(time_s[chosen], np.full(int(chosen.sum()), 1.08), marker, color=colour,
                    markersize=4.0, markeredgewidth=0)
-
-
-def svg(figure: Any) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format='svg', metadata={'Date': None})
-    return stream.getvalue()

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 import shlex
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
 from adversarial_lcd_ros.evaluation.replay import plots
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, read_records, runs_of
@@ -24,6 +22,7 @@ from adversarial_lcd_ros.evaluation.results import (
     SUMMARY,
     read_json,
 )
+from adversarial_lcd_ros.files import write_text
 
 _KIND_TEXT = (('positive', 'a loop is there to be found'),
               ('negative', 'a new place: no loop is there'),
@@ -92,9 +91,9 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
         'decline_rows': wording.decline_rows(summary),
         'figure_rows': wording.figure_rows(summary),
         'curve': None if curve is None else data_uri(curve, 'svg+xml'),
-        'timeline_wide': data_uri(plots.timeline(clean, attacks, threshold, plots.WIDE),
+        'timeline_wide': data_uri(plots.timeline(clean, attacks, threshold, WIDE),
                                   'svg+xml'),
-        'timeline_narrow': data_uri(plots.timeline(clean, attacks, threshold, plots.NARROW),
+        'timeline_narrow': data_uri(plots.timeline(clean, attacks, threshold, NARROW),
                                     'svg+xml'),
         'pictures': [(title, caption, data_uri(data, 'jpeg'))
                      for title, caption, data in read_pictures(folder)],
@@ -102,21 +101,8 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
         'command_line': shlex.join(configuration['command_line']),
         'environment': read_json(folder / ENVIRONMENT)}
     path = folder / REPORT
-    path.write_text(load_template('report.html.j2').render(values), encoding='utf-8')
+    write_text(path, load_template('report.html.j2').render(values))
     return path
-
-
-def load_template(name: str) -> Any:
-    """Return a page of the folder templates; a name it lacks is an error."""
-    environment = Environment(loader=PackageLoader('adversarial_lcd_ros.evaluation'),
-                              autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-                              lstrip_blocks=True)
-    return environment.get_template(name)
-
-
-def data_uri(data: bytes, subtype: str) -> str:
-    """Return an image as a link that holds it."""
-    return f'data:image/{subtype};base64,{b64encode(data).decode("ascii")}'
 
 
 def _threshold(configuration: Mapping[str, Any]) -> float:

@@ -20,8 +20,9 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.pictures import Picture, choose_records, describe
-from adversarial_lcd_ros.evaluation.replay.label_sweep import SWEEP, sweep_labels, write_sweep
+from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
+from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.processes import Recording, Setup, run_pipeline
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,

@@ -13,6 +13,7 @@ from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.metrics import (
+    FRAME_KINDS,
     Metrics,
     effect,
     first_closure_latency_s,
@@ -22,7 +23,6 @@ from adversarial_lcd_ros.evaluation.metrics import (
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
 
 SCHEMA = 1
-KINDS = ('positive', 'negative', 'between', 'no_candidate', 'no_ground_truth')
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,8 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
         'schema': SCHEMA, 'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
         'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
         'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
-        'negatives': kinds['negative'], 'not_scored': {name: kinds[name] for name in KINDS[2:]},
+        'negatives': kinds['negative'],
+        'not_scored': {name: kinds[name] for name in FRAME_KINDS[2:]},
         'clean': _run_figures(clean, block, seed),
         'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
                     for name, run in runs.items()],

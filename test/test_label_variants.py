@@ -9,7 +9,7 @@ from test_labels import path
 
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import LabelConfig
-from adversarial_lcd_ros.evaluation.replay.label_sweep import (
+from adversarial_lcd_ros.evaluation.replay.label_variants import (
     label_variants,
     sweep_labels,
     write_sweep,

@@ -132,8 +132,9 @@ def _open(options: Namespace, nodes: list[int]) -> list[Stream]:
 
 def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
                  cells: list[dict[str, Any]]) -> None:
+    from adversarial_lcd_ros.environment import environment
     from adversarial_lcd_ros.evaluation.frames.run import FIRST_SEED, versions_digest
-    from adversarial_lcd_ros.evaluation.results import ENVIRONMENT, ResultsFolder, environment
+    from adversarial_lcd_ros.evaluation.results import ENVIRONMENT, ResultsFolder
 
     results = ResultsFolder(folder)
     results.write_setup(
