@@ -51,6 +51,7 @@ test: model
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 bench: model $(BENCHABLE)
 	$(BIN)/python -m pytest benchmarks $(ARGS)
@@ -84,5 +85,5 @@ $(BENCHABLE): $(INSTALLED)
 
 clean:
 	rm -rf $(VENV) build dist install log *.egg-info .mypy_cache .pytest_cache .ruff_cache \
-	  .hypothesis .benchmarks
+	  .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

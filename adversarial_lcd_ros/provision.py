@@ -47,10 +47,10 @@ import paddle2onnx
 paddle2onnx.export(*sys.argv[2:5], opset_version=int(sys.argv[5]))
 """
 
-Progress = Callable[[str], None]
 
 
-def fetch_object_model(destination: Path | None = None, progress: Progress | None = None) -> Path:
+def fetch_object_model(destination: Path | None = None,
+                       progress: Callable[[str], None] | None = None) -> Path:
     """
     Return the path of the default object model, after fetching it where it is not yet there.
 
@@ -88,7 +88,7 @@ def fetch_object_model(destination: Path | None = None, progress: Progress | Non
     return path
 
 
-def _make_model(work: Path, path: Path, tell: Progress) -> None:
+def _make_model(work: Path, path: Path, tell: Callable[[str], None]) -> None:
     version, python = _converter_python(path)
     tell(f'downloading {SOURCE} (67 MB)')
     source = _unpack(_download(SOURCE, work / 'source'), work / 'source', SOURCE_FOLDER)

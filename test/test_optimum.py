@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-from graph_factory import flips_of, make_graph
+from graph_factory import make_graph
 import numpy as np
 import pytest
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation.frames.optimum import Optimum, run_optimum
+from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS
@@ -80,13 +80,3 @@ def test_what_cannot_be_attacked_is_said(lcd):
     assert Optimum(taught(lcd), AttackConfig(ratio=0.1)).process(GRAPH).reason == (
         'nothing to compare with')
     assert Optimum(taught(lcd), AttackConfig()).process(GRAPH).reason == 'edit budget below one'
-
-
-def test_a_stream_gives_reports_and_decisions(lcd):
-    stream = [replace(GRAPH.flip(flips_of(GRAPH, np.random.default_rng(k), 2)),
-                      stamp_ns=k * 2 * 10**9, sequence=k) for k in range(3)]
-    run, forwarded = run_optimum(stream, lcd, AttackConfig(ratio=0.05))
-    assert [report.queries for report in run.reports] == [0, 0, 0]
-    assert [report.edits for report in run.reports] == [
-        len(clean.flips_to(sent)) for clean, sent in zip(stream, forwarded, strict=True)]
-    assert not run.decisions[1].is_loop

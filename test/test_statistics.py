@@ -6,7 +6,6 @@ from adversarial_lcd_ros.evaluation.intervals import (
     balanced_accuracy_interval,
     block_frames,
     decline_interval,
-    wilson_interval,
 )
 
 
@@ -66,8 +65,3 @@ def test_empty_class_and_bad_blocks():
     assert balanced_accuracy_interval(kind, kind > 0, 1, 0) is None
     with pytest.raises(EvaluationError, match='blocks of 6 frames in 5'):
         balanced_accuracy_interval(kind, kind > 0, 6, 0)
-
-
-def test_wilson():
-    assert wilson_interval(0, 0) is None
-    assert wilson_interval(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-4)

@@ -24,7 +24,8 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 
 if TYPE_CHECKING:
-    from adversarial_lcd_ros.evaluation.frames.run import Row, Sweep
+    from adversarial_lcd_ros.evaluation.frames.run import Sweep
+    from adversarial_lcd_ros.evaluation.store import Row
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
@@ -70,19 +69,6 @@ def decline_interval(kind: NDArray[np.int8], right_before: NDArray[np.bool_],
     lost = right_before.astype(np.int64) - right_after.astype(np.int64)
     interval = _interval(kind, lost, block, seed, replicates, level)
     return None if interval is None else (100.0 * interval[0], 100.0 * interval[1])
-
-
-def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> Interval | None:
-    """
-    Return Wilson's interval of a proportion; None without trials.
-
-    For independent trials only, such as pairs far apart; it is too narrow for video frames.
-
-    """
-    if trials == 0:
-        return None
-    interval = binomtest(successes, trials).proportion_ci(level, method='wilson')
-    return float(interval.low), float(interval.high)
 
 
 def class_mean_interval(size: NDArray[np.int64], total: NDArray[np.int64], block: int, seed: int,

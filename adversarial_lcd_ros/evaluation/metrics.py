@@ -23,6 +23,9 @@ from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 Outcomes = NDArray[np.str_]
 # What ground truth says of a frame, in words; only the first two are scored.
 FRAME_KINDS = ('positive', 'negative', 'between', 'no_candidate', 'no_ground_truth')
+# What an attack did to a frame, by its outcomes before and after.
+EFFECTS = {('TP', 'FN'): 'suppressed', ('TP', 'WM'): 'diverted', ('TN', 'FP'): 'invented',
+           ('FN', 'TP'): 'regained', ('WM', 'TP'): 'regained', ('FP', 'TN'): 'withdrawn'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +184,20 @@ def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
         positives=positives, negatives=negatives, tp=count['TP'], fn=count['FN'] + count['WM'],
         fp=count['FP'], tn=count['TN'], wrong_matches=count['WM'],
         accuracy=_ratio(count['TP'] + count['TN'], positives + negatives),
-        balanced_accuracy=((recall or 0.0) + (specificity or 0.0)) / 2 if both else None,
+        balanced_accuracy=balanced_accuracy(kind, outcome),
         precision=_ratio(count['TP'], declared), recall=recall, specificity=specificity,
         recall_at_100_precision=_recall_at_100_precision(curve),
         average_precision=_average_precision(kind, probability, match_correct),
         mcc=_mcc(kind, outcome) if both else None, curve=curve)
+
+
+def balanced_accuracy(kind: NDArray[np.int8], outcome: Outcomes) -> float | None:
+    """Return the mean of the shares of right decisions of both kinds; None if one is empty."""
+    correct = right(outcome)
+    rates = [_ratio(int(correct[kind == value].sum()), int((kind == value).sum()))
+             for value in (POSITIVE, NEGATIVE)]
+    known = [rate for rate in rates if rate is not None]
+    return sum(known) / 2 if len(known) == 2 else None
 
 
 def effect(kind: NDArray[np.int8], before: Outcomes, after: Outcomes) -> Effect:

@@ -14,6 +14,7 @@ from typing import Any
 from adversarial_lcd_ros.errors import EvaluationError
 
 CELLS = 'cells.jsonl'
+Row = dict[str, Any]  # one line of it, or of summary.json: column to value
 _LOCK = '.lock'
 _log = logging.getLogger(__name__)
 

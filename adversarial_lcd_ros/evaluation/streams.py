@@ -19,7 +19,6 @@ from adversarial_lcd_ros.sequences.part import SequencePart
 
 _KEPT = 6
 
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,8 @@ class Stream:
 
 
 def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,
-                 config: LabelConfig, cache: Path | None, progress: Progress) -> list[Stream]:
+                 config: LabelConfig, cache: Path | None,
+                 progress: Callable[[str, int, int], None]) -> list[Stream]:
     """
     Open, and where needed build, the graphs of every sequence and size; label the frames.
 

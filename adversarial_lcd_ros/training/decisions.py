@@ -17,6 +17,7 @@ from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.ground_truth.labels import label_frames
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 from adversarial_lcd_ros.lcd.decision import Decision
@@ -25,7 +26,6 @@ from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.training.gnn import train_gnn
 from adversarial_lcd_ros.training.pair_scores import (
     LabelledPairs,
-    Progress,
     fit_decision,
     retrieved_pairs,
 )

@@ -6,7 +6,7 @@ PyTorch is an extra, adversarial_lcd_ros[gnn]; only this module needs it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.targets.gnn import INPUTS, OUTPUT, network_inputs
 from adversarial_lcd_ros.lcd.views import View, match_nodes
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs
@@ -27,7 +28,6 @@ HIDDEN, EMBEDDING = 64, 32
 LEARNING_RATE, WEIGHT_DECAY = 3e-3, 1e-4
 OPSET = 14
 
-Progress = Callable[[int, int], None]
 Layers = list[tuple['torch.nn.Linear', 'torch.nn.Linear']]
 
 

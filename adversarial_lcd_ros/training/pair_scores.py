@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,12 +14,11 @@ from sklearn.preprocessing import StandardScaler
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets import Target, make_target
 from adversarial_lcd_ros.lcd.views import Comparison, View
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
@@ -36,7 +37,6 @@ from adversarial_lcd_ros.training.model_folder import (
     model_folder,
     network_file,
 )
-from adversarial_lcd_ros.training.pair_scores import Progress
 from adversarial_lcd_ros.training.sources import (
     TrainingFrames,
     one_licence_each,

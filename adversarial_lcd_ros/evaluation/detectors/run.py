@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
     right,
 )
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
@@ -37,7 +37,6 @@ from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 SCHEMA = 2
 PROTOCOLS = ('pairs', 'live')
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

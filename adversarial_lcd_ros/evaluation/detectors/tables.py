@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
-from typing import Any
 
 from adversarial_lcd_ros.config import TARGETS
+from adversarial_lcd_ros.evaluation.store import Row
 
-Row = Mapping[str, Any]
 _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average precision',
                     'recall at 100 % precision', 'MCC'),
           'live': ('loops / new places', 'balanced accuracy', '95 % interval', 'precision',

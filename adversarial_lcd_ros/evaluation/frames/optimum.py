@@ -9,8 +9,7 @@ together can be better still.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-import time
+from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -18,9 +17,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.attacker import AttackResult
 from adversarial_lcd_ros.attack.oracle import MAX_LOGIT, edit_budget
-from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation.replay.offline import Progress
-from adversarial_lcd_ros.evaluation.replay.records import AttackRun
+from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer
@@ -96,20 +93,3 @@ class Optimum:
         """Return L of Eq. (1): log odds against the detector's answer to the clean graph."""
         logit = float(self.detector.log_odds(graph).max())
         return -logit if is_loop else logit
-
-
-def run_optimum(graphs: Sequence[MultiTierGraph], lcd: LcdConfig, config: AttackConfig,
-                progress: Progress | None = None) -> tuple[AttackRun, list[MultiTierGraph]]:
-    """Return what ``run_offline`` returns for an attack, for the optimum in its place."""
-    detector = LoopClosureDetector(lcd)
-    optimum = Optimum(detector, config)
-    decisions, reports, forwarded = [], [], []
-    for done, clean in enumerate(graphs):
-        started = time.perf_counter()
-        result = optimum.process(clean)
-        reports.append(result.report(time.perf_counter() - started))
-        decisions.append(detector.detect(result.perturbed))
-        forwarded.append(result.perturbed)
-        if progress:
-            progress(done + 1, len(graphs))
-    return AttackRun(decisions, reports), forwarded

@@ -19,7 +19,9 @@ from adversarial_lcd_ros.evaluation.frames.attacked import (
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.metrics import EFFECTS
 from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs
@@ -29,11 +31,10 @@ from adversarial_lcd_ros.vision.draw import draw_attack
 
 PICTURES = 6
 _BLANK_GREY = 235
-# Of outcomes clean and attacked; they take turns.
-_TELLING = {('TP', 'FN'): 'suppressed', ('TN', 'FP'): 'invented', ('TP', 'WM'): 'diverted'}
+# They take turns.
+_TELLING = ('suppressed', 'invented', 'diverted')
 
 _log = logging.getLogger(__name__)
-Row = dict[str, Any]
 # A row, and one of its frames.
 _Chosen = tuple[Row, dict[str, Any]]
 
@@ -84,10 +85,10 @@ def _strongest(attacks: Mapping[str, Sequence[Row]]) -> str:
 
 def _choose(rows: Sequence[Row], count: int) -> list[_Chosen]:
     waiting: dict[tuple[str, str], list[_Chosen]] = defaultdict(list)
-    for effect in _TELLING.values():
+    for effect in _TELLING:
         for row in rows:
             found = [(row, frame) for frame in row['frame_results']
-                     if _TELLING.get((frame['clean'], frame['attacked'])) == effect]
+                     if EFFECTS.get((frame['clean'], frame['attacked'])) == effect]
             waiting[effect, row['sequence']] += found
     return list(_in_turns([group for group in waiting.values() if group], count))
 
@@ -119,7 +120,7 @@ def _again(stream: Stream, cell: Cell, row: Row, frame: dict[str, Any],
 
 
 def _picture(stream: Stream, row: Row, frame: dict[str, Any], found: FrameResult) -> Picture:
-    effect = _TELLING[frame['clean'], frame['attacked']]
+    effect = EFFECTS[frame['clean'], frame['attacked']]
     graphs = load_stream_graphs(stream.graphs)
     stamp = (found.clean if effect == 'suppressed' else found.attacked).match_stamp_ns
     match = next(graph for graph in graphs if graph.stamp_ns == stamp)

@@ -47,7 +47,8 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'negatives': int((kind == NEGATIVE).sum()),
         'accuracy_clean': _mean(metrics.right(before)),
         'accuracy_attacked': _mean(metrics.right(after)),
-        'balanced_clean': _balanced(kind, before), 'balanced_attacked': _balanced(kind, after),
+        'balanced_clean': metrics.balanced_accuracy(kind, before),
+        'balanced_attacked': metrics.balanced_accuracy(kind, after),
         'decline_pp': change.decline_pp, 'suppressed': change.suppressed,
         'invented': change.invented,
         'unattackable': sum(attack.edit_budget < 1 or attack.status == 'skipped'
@@ -68,12 +69,6 @@ def _outcomes(kind: NDArray[np.int8], results: Sequence[FrameResult],
 
 def _mean(values: Sequence[float] | NDArray[Any]) -> float | None:
     return float(np.mean(values)) if len(values) else None
-
-
-def _balanced(kind: NDArray[np.int8], outcome: metrics.Outcomes) -> float | None:
-    rates = [_mean(metrics.right(outcome)[kind == value]) for value in (POSITIVE, NEGATIVE)]
-    known = [rate for rate in rates if rate is not None]
-    return sum(known) / 2 if len(known) == 2 else None
 
 
 def _frame(result: FrameResult, before: str, after: str) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 import hashlib
 import json
-from typing import Any
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
@@ -28,7 +27,7 @@ from adversarial_lcd_ros.evaluation.frames.attacked import (
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.evaluation.frames.rows import make_row
-from adversarial_lcd_ros.evaluation.store import CellStore
+from adversarial_lcd_ros.evaluation.store import CellStore, Row
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.workers import Run
 from adversarial_lcd_ros.paths import target_path
@@ -46,8 +45,6 @@ _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
 # Recall groups flips, and does not spend its queries one by one.
 _RECALL_SHARE = 0.15
 
-Progress = Callable[[float, float], None]
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +175,8 @@ def _expected_s(cell: Cell, nodes: float) -> float:
     return _FRAME_S + asked * query_s * nodes / _NODES
 
 
-def run_sweep(sweep: Sweep, store: CellStore, run: Run, progress: Progress) -> list[Row]:
+def run_sweep(sweep: Sweep, store: CellStore, run: Run,
+              progress: Callable[[float, float], None]) -> list[Row]:
     """
     Run the tasks of a sweep; return the rows of all its cells, those of earlier runs included.
 

@@ -16,11 +16,11 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     OPTIMUM,
     USUAL,
     Cell,
-    Row,
     frame_right,
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import SETTING
+from adversarial_lcd_ros.evaluation.store import Row
 
 _POINTS = 120
 _SHARED = tuple(name for name in SETTING if name not in ('target', 'mode'))

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.summaries import Cell, Row
+from adversarial_lcd_ros.evaluation.paper.summaries import Cell
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files import write_text
 
 SUMMARY, CELLS_CSV, SUMMARY_CSV, TABLES_TEX = (

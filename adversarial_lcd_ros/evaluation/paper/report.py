@@ -22,7 +22,6 @@ from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     Cell,
-    Row,
     summarise_cells,
     summarise_methods,
 )
@@ -30,6 +29,7 @@ from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import REPORT
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files import write_text
 
 TABLES_MD = 'tables.md'

@@ -23,6 +23,7 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
@@ -38,7 +39,6 @@ _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_att
 _KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
-Row = Mapping[str, Any]
 Cell = dict[str, Any]
 
 

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.metrics import Outcomes, effect, outcomes, right
+from adversarial_lcd_ros.evaluation.metrics import Outcomes, balanced_accuracy, effect, outcomes
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
 from adversarial_lcd_ros.ground_truth.labels import (
     NEGATIVE,
@@ -31,7 +30,6 @@ _GRID: Mapping[str, tuple[float, ...]] = {
     'min_gap_s': (4.0, 12.0, 16.0), 'positive_distance_m': (0.3, 1.0),
     'positive_angle_deg': (15.0, 40.0)}
 
-Row = dict[str, Any]
 
 
 def label_variants(base: LabelConfig) -> Iterator[tuple[str, LabelConfig]]:
@@ -50,7 +48,7 @@ def label_variants(base: LabelConfig) -> Iterator[tuple[str, LabelConfig]]:
 
 
 def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
-                 image_size: tuple[int, int], base: LabelConfig) -> list[Row]:
+                 image_size: tuple[int, int], base: LabelConfig) -> list[dict[str, Any]]:
     """
     Return the figures of every run under every variant of the labels.
 
@@ -81,13 +79,13 @@ def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
             rows.append({
                 'labels': title, 'run': name, 'positives': int((labels.kind == POSITIVE).sum()),
                 'negatives': int((labels.kind == NEGATIVE).sum()),
-                'balanced_accuracy': _balanced(labels.kind, right(found)),
+                'balanced_accuracy': balanced_accuracy(labels.kind, found),
                 'decline_pp': change.decline_pp, 'suppressed': change.suppressed,
                 'invented': change.invented, **asdict(config)})
     return rows
 
 
-def write_sweep(path: Path, rows: Sequence[Row]) -> None:
+def write_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write the rows as CSV."""
     with path.open('w', newline='', encoding='utf-8') as stream:
         writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
@@ -100,10 +98,3 @@ def _outcomes(labels: FrameLabels, run: Sequence[QueryRecord]) -> Outcomes:
                       for record in run], np.int64)
     return outcomes(labels.kind, column(run, 'is_loop').astype(bool),
                     labels.is_correct(np.arange(len(match)), match))
-
-
-def _balanced(kind: NDArray[np.int8], correct: NDArray[np.bool_]) -> float | None:
-    shares = [correct[kind == value] for value in (POSITIVE, NEGATIVE)]
-    if not all(map(len, shares)):
-        return None
-    return float(np.mean([share.mean() for share in shares]))

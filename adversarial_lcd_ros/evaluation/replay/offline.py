@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import time
 
 from adversarial_lcd_ros.attack.attacker import Attacker
@@ -10,9 +10,8 @@ from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation.replay.records import AttackRun
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-
-Progress = Callable[[int, int], None]
 
 
 def run_offline(graphs: Sequence[MultiTierGraph], lcd: LcdConfig,

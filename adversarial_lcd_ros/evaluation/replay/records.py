@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.metrics import outcomes
+from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 
 CLEAN = 'clean'
 _KINDS = {'positive': POSITIVE, 'negative': NEGATIVE}
-_EFFECTS = {('TP', 'FN'): 'suppressed', ('TP', 'WM'): 'diverted', ('TN', 'FP'): 'invented',
-            ('FN', 'TP'): 'regained', ('WM', 'TP'): 'regained', ('FP', 'TN'): 'withdrawn'}
 _PARSERS: dict[str, Callable[[str], Any]] = {
     'int': int, 'float': float, 'str': str, 'bool': {'0': False, '1': True}.__getitem__}
 
@@ -113,7 +111,7 @@ def make_records(labels: FrameLabels, clean: Sequence[LoopClosure],
         rows = _run_records(name, labels, run.decisions)
         records += [
             QueryRecord(**{**asdict(row), **_report_fields(report),
-                           'effect': _EFFECTS.get((was, row.outcome), '')})
+                           'effect': EFFECTS.get((was, row.outcome), '')})
             for row, was, report in zip(rows, before, run.reports, strict=True)]
     return records
 
