@@ -11,7 +11,7 @@ import pytest
 from adversarial_lcd_ros.attack.attacker import AttackResult
 from adversarial_lcd_ros.codec import LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames import cells as cells_module
 from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
@@ -39,9 +39,25 @@ def test_a_key_depends_on_seed_sequence_detector_code_and_models(tmp_path, monke
         model = tmp_path / f'{content}.json'
         model.write_text(content)
         others.append(cell_key(CELL, 42, 'a', LcdConfig(model=str(model))))
+    monkeypatch.setattr(cells_module, 'code_digest', lambda *places: 'other code')
+    others.append(cell_key(CELL, 42, 'a', LcdConfig()))
     monkeypatch.setattr(cells_module, 'SCHEMA', -1)
     others.append(cell_key(CELL, 42, 'a', LcdConfig()))
-    assert len({key, *others}) == 7
+    assert len({key, *others}) == 8
+
+
+def test_a_key_depends_on_the_code_of_a_class_of_the_users_own(tmp_path, monkeypatch):
+    module = tmp_path / 'someones_targets.py'
+    monkeypatch.syspath_prepend(tmp_path)
+    keys = []
+    for code in ('class Degree: 1', 'class Degree: 2'):
+        module.write_text(code)
+        monkeypatch.setattr(cells_module, '_files', lambda cell, lcd: [])
+        keys.append(cell_key(replace(CELL, target='someones_targets:Degree'), 42, 'a',
+                             LcdConfig()))
+    assert len(set(keys)) == 2
+    with pytest.raises(ConfigError, match='no module nobodys'):
+        cell_key(replace(CELL, target='nobodys:Degree'), 42, 'a', LcdConfig())
 
 
 def test_a_key_depends_on_nothing_else():

@@ -8,13 +8,16 @@ import cv2
 from graph_factory import make_graph
 import numpy as np
 import pytest
+from sweep_factory import walk_folder
 
 from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.graph_sequences import cache
 from adversarial_lcd_ros.graph_sequences import opening as graph_sequences
 from adversarial_lcd_ros.graph_sequences.cache import load_graphs, save_graphs
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
+from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
@@ -170,3 +173,12 @@ def test_clean_graphs_go_before_attacked_ones(tmp_path, config):
     found = open_graphs(str(bag), config)
     assert len(found.graphs) == 4
     assert found.trajectory is None
+
+
+def test_the_key_of_kept_graphs_knows_the_code_that_built_them(tmp_path, config, monkeypatch):
+    sequence = open_sequence(walk_folder(tmp_path / 'walk'))
+    keys = []
+    for code in ('of yesterday', 'of today'):
+        monkeypatch.setattr(cache, 'code_digest', lambda *places, code=code: code)
+        keys.append(cache.cache_key(sequence, range(2), config))
+    assert len(set(keys)) == 2

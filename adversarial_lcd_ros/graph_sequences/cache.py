@@ -12,20 +12,22 @@ import tempfile
 from zipfile import BadZipFile
 
 import cv2
+import numba
 import numpy as np
 import onnxruntime
 import scipy
 
-from adversarial_lcd_ros import vision
 from adversarial_lcd_ros.codec import decode_graph, encode_graph, schema_text
 from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.errors import CodecError, EvaluationError, ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.paths import VOCABULARY, model_path, object_model_path
 from adversarial_lcd_ros.sequences import Sequence
 
-# What decides on the bytes of a graph beside the code of this package.
-_LIBRARIES = (np, scipy, cv2, onnxruntime)
+# What decides on the bytes of a graph: libraries, and code of this package.
+_LIBRARIES = (np, scipy, cv2, onnxruntime, numba)
+_CODE = ('vision', 'graph', 'compiled', 'codec', 'sequences/frame', 'sequences/detections')
 # Threads change how long a graph takes, not what it is.
 _IRRELEVANT = ('threads',)
 
@@ -55,7 +57,7 @@ def cache_key(sequence: Sequence, numbers: range, config: BuilderConfig) -> str:
             sort_keys=True).encode(),
         sequence.stamps_ns[numbers.start:numbers.stop].tobytes(), first.data,
         schema_text('MultiTierGraph').encode(),
-        *(_bytes(path) for path in (*_named_files(config), *_code()))]
+        code_digest(*_CODE).encode(), *(_bytes(path) for path in _named_files(config))]
     digest = hashlib.blake2b(digest_size=16)
     for part in parts:
         # With its length, so that no two lists of parts run into the same bytes.
@@ -70,10 +72,6 @@ def _named_files(config: BuilderConfig) -> list[Path]:
     if config.detector == 'csv' and config.detections:
         files.append(Path(config.detections))
     return files
-
-
-def _code() -> list[Path]:
-    return [path for folder in vision.__path__ for path in sorted(Path(folder).glob('*.py'))]
 
 
 def _bytes(path: Path) -> bytes:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
 from adversarial_lcd_ros.evaluation.metrics import (
@@ -35,7 +36,11 @@ from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.training.model_folder import trained_on
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
-SCHEMA = 2
+# Of the row's columns; a change in the code below makes rows again by itself.
+SCHEMA = 3
+_CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'ground_truth/pairs',
+         'training/pair_scores', 'evaluation/metrics', 'evaluation/intervals',
+         'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')
 
 
@@ -75,7 +80,8 @@ class TargetTask:
     @property
     def key(self) -> str:
         """Digest of all that the figures depend on, hexadecimal."""
-        values = {'schema': SCHEMA, 'stream': self.stream.digest, 'protocol': self.protocol,
+        values = {'schema': SCHEMA, 'code': code_digest(*_CODE),
+                  'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
                   'models': [file_digest(path) for path in
                              (self.model, self.model.with_suffix('.onnx')) if path.exists()],

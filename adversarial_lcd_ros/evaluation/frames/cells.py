@@ -13,11 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
+from adversarial_lcd_ros.environment import code_digest, named_code_digest
 from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
 from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path, target_path
 
-# To be raised whenever the same settings give other figures: finished cells are run again.
-SCHEMA = 3
+# Of the row's columns; a change in the code below runs cells again by itself.
+SCHEMA = 4
+# What makes the figures of a row.
+_CODE = ('attack', 'lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled',
+         'evaluation/metrics', 'evaluation/frames/attacked', 'evaluation/frames/optimum',
+         'evaluation/frames/rows')
 ORACLES = ('soft', 'hard')
 # Attack settings that have columns of their own.
 _COLUMNS = ('mode', 'perturbation', 'surrogate', 'ratio', 'edits', 'queries_per_edit', 'seed')
@@ -106,8 +111,17 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
               'detector': detector, 'attack': attack,
               **{name: value for name, value in cell.settings.items() if name not in detector},
+              'code': [code_digest(*_CODE), *_own_code(cell)],
               'files': [file_digest(path) for path in _files(cell, lcd)]}
     return digest_of(json.dumps(values, sort_keys=True).encode())
+
+
+def _own_code(cell: Cell) -> list[str]:
+    """Return digests of the classes of the user's own, which are named as package.module:Class."""
+    attack = [value for name, value in asdict(cell.attack).items() if name not in _FILES]
+    named = [cell.target, cell.asked_target, cell.perturbation, *attack]
+    return [named_code_digest(name) for name in dict.fromkeys(named)
+            if isinstance(name, str) and ':' in name]
 
 
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
