@@ -14,6 +14,7 @@ import sys
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.commands import (
     build,
+    compare,
     evaluate,
     fetch_model,
     importing,
@@ -58,7 +59,7 @@ def _parser() -> ArgumentParser:
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                targets.add, train.add, fetch_model.add, inspect.add, params.add):
+                compare.add, targets.add, train.add, fetch_model.add, inspect.add, params.add):
         add(commands)
     return parser
 

@@ -55,12 +55,25 @@ def target_path(chosen: str, target: str) -> Path:
         That file, or a folder of a training that holds it; empty: the one that ships.
     target : str
 
+    Raises
+    ------
+    ModelError
+        The folder was trained without that target.
+
     """
     name = f'target_{target}.json'
     if not chosen:
         return model_path(name)
     path = Path(chosen)
-    return path / name if path.is_dir() else path
+    if not path.is_dir():
+        return path
+    if not (path / name).is_file():
+        there = ', '.join(sorted(file.stem.removeprefix('target_')
+                                 for file in path.glob('target_*.json'))) or 'none'
+        raise ModelError(f'{path} has no decision for the target {target}; those trained there: '
+                         f'{there}. Choose one of them, or train it with "adversarial-lcd train '
+                         f'... --targets {target}"')
+    return path / name
 
 
 def cache_folder() -> Path:

@@ -78,7 +78,7 @@ def test_page_is_one_file_with_everything_in_it(whole):
 
 def test_exports_hold_the_same_figures(whole):
     folder, rows = whole
-    summary = json.loads((folder / 'summary.json').read_text())
+    summary = json.loads((folder / 'summary.json').read_text())['rows']
     with (folder / 'cells.csv').open(newline='') as stream:
         cells = list(csv.DictReader(stream))
     with (folder / 'summary.csv').open(newline='') as stream:

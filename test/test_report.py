@@ -23,7 +23,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     runs_of,
     write_records,
 )
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.ground_truth.labels import label_frames
 
 COUNT = 60
@@ -190,7 +190,7 @@ class Links(HTMLParser):
 def folder(tmp_path, records, summary):
     made = results.ResultsFolder.create(tmp_path / 'results')
     made.write_setup([LcdConfig(), *ATTACKS.values()], ['adversarial-lcd', '<evaluate>'], 1)
-    made.write_json(results.SUMMARY, summary)
+    made.write_json(results.SUMMARY, as_document(summary))
     write_records(made.path / results.RECORDS, records)
     pictures = [Picture(f'Frame {n}', 'a & b', np.full((9, 16, 3), n, np.uint8))
                 for n in range(6)]

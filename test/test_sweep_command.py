@@ -39,7 +39,7 @@ def test_it_announces_runs_reports_and_goes_on(tmp_path, command, capsys):
     assert '5 of 5 cells to run' in said.err
     assert str(tmp_path / 'out' / 'report.html') in said.out
     assert 'random_flip, none, query' in said.out
-    summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [entry['seeds'] for entry in summary] == [1] * 5
     assert {'sequence', 'target', 'perturbation', 'surrogate', 'oracle', 'mode', 'ratio',
             'nodes_mean', 'accuracy_clean', 'accuracy_attacked', 'decline_pp', 'ci95',
@@ -59,7 +59,7 @@ def test_it_announces_runs_reports_and_goes_on(tmp_path, command, capsys):
 
 def test_settings_of_the_command_line_win(tmp_path, command):
     assert command('--perturbation', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
-    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert (entry['perturbation'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
 
 
@@ -69,7 +69,7 @@ def test_cells_of_other_settings_are_kept_and_not_reported(tmp_path, command, ca
                        candidates) == 0
     assert 'models or code: 1;' in capsys.readouterr().err
     assert len((tmp_path / 'out' / 'cells.jsonl').read_text().splitlines()) == 2
-    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert entry['seeds'] == 1
 
 

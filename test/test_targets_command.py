@@ -39,7 +39,7 @@ def command(tmp_path, vocabulary, monkeypatch):
 
 def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
     assert command('--targets', 'edges', 'vbow') == 0
-    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [(row['protocol'], row['target']) for row in rows] == [
         ('pairs', 'edges'), ('pairs', 'vbow'), ('live', 'edges'), ('live', 'vbow')]
     pairs, live = rows[0], rows[2]
@@ -75,7 +75,7 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     # More matches are asked for than there are features: nothing passes.
     assert command('--targets', 'edges', '--lcd-geometric-check',
                    '--lcd-geometric-inliers', '21') == 0
-    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['geometric_check'] for row in rows] == [False, True]
     assert rows[1]['recall'] == 0
     assert '| walk, geometric check |' in capsys.readouterr().out
@@ -83,7 +83,7 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
 
 def test_live_and_pairs_see_the_threshold(tmp_path, command):
     assert command('--targets', 'edges', '--lcd-threshold', '0') == 0
-    for row in json.loads((tmp_path / 'out' / 'summary.json').read_text()):
+    for row in json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']:
         assert row['recall'] == 1
         assert row['balanced_accuracy'] == 0.5
 

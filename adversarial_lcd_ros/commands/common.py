@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace, _SubParsersAction
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import sys
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 TABLE_WIDTH = 150
 Commands: TypeAlias = '_SubParsersAction[ArgumentParser]'
@@ -18,6 +18,33 @@ def add_command(commands: Commands, name: str, help: str,
     parser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(run=run)
     return parser
+
+
+def add_json_option(parser: ArgumentParser) -> None:
+    """Declare ``--json``."""
+    parser.add_argument('--json', action='store_true',
+                        help='print the results as data (JSON), and nothing else, on standard '
+                        'output')
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print values as JSON; what is not a finite number becomes null."""
+    from adversarial_lcd_ros.files import json_text
+
+    print(json_text(values), end='')
+
+
+def print_rows(title: str, rows: Sequence[Mapping[str, str]]) -> None:
+    """Print rows of heading to cell as a table; where there is no terminal, as wide as it is."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify='left')
+    for index, heading in enumerate(rows[0] if rows else ()):
+        table.add_column(heading, justify='left' if index == 0 else 'right')
+    for row in rows:
+        table.add_row(*row.values())
+    Console(width=None if sys.stdout.isatty() else TABLE_WIDTH).print(table)
 
 
 @contextmanager

@@ -8,7 +8,14 @@ from pathlib import Path
 import sys
 
 from adversarial_lcd_ros.commands import evaluate_frames
-from adversarial_lcd_ros.commands.common import TABLE_WIDTH, Commands, add_command, tell
+from adversarial_lcd_ros.commands.common import (
+    TABLE_WIDTH,
+    Commands,
+    add_command,
+    add_json_option,
+    print_json,
+    tell,
+)
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -75,6 +82,7 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         '(also label_sweep.csv)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
+    add_json_option(parser)
     add_models_option(parser)
     for config_class, prefix in EVALUATED:
         add_config_options(parser, config_class, prefix)
@@ -105,6 +113,7 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
 
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+    from adversarial_lcd_ros.evaluation.replay.summary import as_document
     from adversarial_lcd_ros.evaluation.replay.tables import (
         decline_table,
         figure_table,
@@ -121,6 +130,9 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
                 attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
                                     keep_recordings=options.keep_recordings)
+    if options.json:
+        print_json({'folder': str(folder), **as_document(summary)})
+        return
     # Where there is no terminal there is no width to keep to.
     console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
     console.print(figure_table(summary))

@@ -12,7 +12,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from adversarial_lcd_ros.commands.common import TABLE_WIDTH, progress_bar, tell
+from adversarial_lcd_ros.commands.common import TABLE_WIDTH, print_json, progress_bar, tell
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -60,6 +60,7 @@ def run(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
     from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
+    from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
     from adversarial_lcd_ros.evaluation.store import open_store
 
     started = time.monotonic()
@@ -81,6 +82,9 @@ def run(options: Namespace) -> None:
             raise
         write_pictures(folder, sweep_pictures(streams, cells, rows, lcd))
         report = write_paper_report(folder, rows)
+    if options.json:
+        print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
+        return
     _conclude(rows, time.monotonic() - started, report)
 
 

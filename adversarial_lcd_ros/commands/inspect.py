@@ -1,12 +1,19 @@
-"""adversarial-lcd inspect: what a bag or a payload holds."""
+"""adversarial-lcd inspect: what a bag, a payload or a results folder holds."""
 
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adversarial_lcd_ros.commands.common import Commands, add_command
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_json_option,
+    print_json,
+    print_rows,
+)
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences.inspection import BagSummary
@@ -14,19 +21,50 @@ if TYPE_CHECKING:
 
 def add(commands: Commands) -> None:
     """Declare the command."""
-    parser = add_command(commands, 'inspect', 'Print what a bag or a payload holds.', _inspect)
-    parser.add_argument('path', type=Path, help='rosbag2 folder, .mcap, .db3 or .bag file, or a '
-                        'file with the payload of one message')
+    parser = add_command(commands, 'inspect', 'Print what a bag, a payload or a results folder '
+                         'holds.', _inspect)
+    parser.add_argument('path', type=Path, help='rosbag2 folder, .mcap, .db3 or .bag file, a file '
+                        'with the payload of one message, or a results folder')
+    add_json_option(parser)
 
 
 def _inspect(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.kinds import is_results
     from adversarial_lcd_ros.sequences.bagfile import is_bag
-    from adversarial_lcd_ros.sequences.inspection import inspect_bag, inspect_payload
+    from adversarial_lcd_ros.sequences.inspection import (
+        inspect_bag,
+        inspect_payload,
+        payload_values,
+    )
 
-    if options.path.is_file() and not is_bag(options.path):
-        _show_payload(*inspect_payload(options.path))
+    if is_results(options.path):
+        _show_results(options.path, as_json=options.json)
+    elif options.path.is_file() and not is_bag(options.path):
+        name, content = inspect_payload(options.path)
+        if options.json:
+            print_json({'message': name, **payload_values(content)})
+        else:
+            _show_payload(name, content)
     else:
-        _show_bag(inspect_bag(options.path))
+        bag = inspect_bag(options.path)
+        if options.json:
+            print_json({**asdict(bag), 'path': str(bag.path)})
+        else:
+            _show_bag(bag)
+
+
+def _show_results(folder: Path, *, as_json: bool) -> None:
+    from adversarial_lcd_ros.evaluation.kinds import open_results
+
+    kind, results = open_results(folder)
+    if as_json:
+        print_json({'folder': str(folder), **results.summary,
+                    'configuration': results.configuration, 'environment': results.environment})
+        return
+    print(f'{folder}: results of the kind "{kind.name}", {len(results.rows)} rows, by '
+          f'{results.environment.get("code")}, {results.environment.get("time_utc")}')
+    for table in kind.tables(results):
+        print_rows(table.title, table.rows)
 
 
 def _show_bag(bag: BagSummary) -> None:

@@ -16,6 +16,7 @@ def add(commands: Commands) -> None:
 
 
 def _report(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.replay.report import report_folder
+    from adversarial_lcd_ros.evaluation.kinds import open_results
 
-    print(report_folder(options.folder))
+    kind, results = open_results(options.folder)
+    print(kind.report(results))

@@ -9,7 +9,14 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
 
-from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar, tell
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_json_option,
+    print_json,
+    progress_bar,
+    tell,
+)
 from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import add_config_options, add_models_option, chosen_settings
@@ -20,7 +27,6 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.streams import Stream
 
 PROTOCOLS = ('pairs', 'live')
-TABLES = 'target.md'
 _CONFIGS = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (LabelConfig, 'label-'))
 
 
@@ -59,17 +65,19 @@ def add(commands: Commands) -> None:
                         help='where built graphs are kept (default: in the cache of the user)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
+    add_json_option(parser)
     add_models_option(parser)
     for config, prefix in _CONFIGS:
         add_config_options(parser, config, prefix)
 
 
 def _run(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.detectors.run import run_target
-    from adversarial_lcd_ros.evaluation.detectors.tables import target_tables
-    from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder
+    from adversarial_lcd_ros.evaluation.detectors.run import KIND, SCHEMA, run_target
+    from adversarial_lcd_ros.evaluation.detectors.tables import TABLES, target_tables
+    from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
     from adversarial_lcd_ros.evaluation.store import open_store
     from adversarial_lcd_ros.evaluation.workers import local_workers
+    from adversarial_lcd_ros.files import write_text
 
     for name in ('pairs', 'draws', 'jobs'):
         if getattr(options, name) < 1:
@@ -88,9 +96,13 @@ def _run(options: Namespace) -> None:
                 store.add(key, row)
                 progress(done + 1, len(left))
         rows = [store.rows[task.key] for task in tasks]
-        results.write_json(SUMMARY, rows)
+        summary = summary_document(KIND, SCHEMA, rows)
+        results.write_json(SUMMARY, summary)
     tables = target_tables(rows)
-    (options.output / TABLES).write_text(tables, encoding='utf-8')
+    write_text(options.output / TABLES, tables)
+    if options.json:
+        print_json({'folder': str(options.output), **summary})
+        return
     print(tables, end='')
     print(options.output / SUMMARY)
 

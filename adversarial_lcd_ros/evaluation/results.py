@@ -112,6 +112,26 @@ def _new_folder(root: Path, name: str) -> Path:
         number += 1
 
 
+def summary_document(kind: str, schema: int, rows: Sequence[Mapping[str, Any]],
+                     more: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """
+    Return the content of summary.json, the same for every kind of results.
+
+    Parameters
+    ----------
+    kind : str
+        A name of ``kinds.KINDS``.
+    schema : int
+        Version of the rows.
+    rows : sequence of mapping
+        Column to value.
+    more : mapping, optional
+        What is true of all rows.
+
+    """
+    return {'kind': kind, 'schema': schema, **(more or {}), 'rows': list(rows)}
+
+
 def read_json(path: Path) -> dict[str, Any]:
     """
     Read a JSON object of a results folder.

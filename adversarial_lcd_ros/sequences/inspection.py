@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -145,3 +145,16 @@ def inspect_payload(path: Path) -> tuple[str, Any]:
         raise CodecError(f'{path} is neither a bag nor a payload of '
                          f'{", ".join(codec.MESSAGES)}')
     return name, content
+
+
+def payload_values(content: Any) -> dict[str, Any]:
+    """Return what a payload says, ready for JSON; of a graph its sizes, of descriptors nothing."""
+    if isinstance(content, MultiTierGraph):
+        return {'nodes': content.node_count, 'edges': content.edge_count,
+                'objects': content.object_count, 'width': content.width,
+                'height': content.height, 'sequence': content.sequence,
+                'stamp_ns': content.stamp_ns, 'frame_id': content.frame_id}
+    values = {entry.name: getattr(content, entry.name) for entry in fields(content)}
+    return {name: payload_values(value) if isinstance(value, MultiTierGraph)
+            else value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in values.items()}

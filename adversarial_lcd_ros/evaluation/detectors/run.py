@@ -37,7 +37,7 @@ from adversarial_lcd_ros.training.model_folder import trained_on
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 # Of the row's columns; a change in the code below makes rows again by itself.
-SCHEMA = 3
+KIND, SCHEMA = 'targets', 3
 _CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'ground_truth/pairs',
          'training/pair_scores', 'evaluation/metrics', 'evaluation/intervals',
          'evaluation/replay/offline', 'evaluation/detectors/run')

@@ -8,6 +8,7 @@ from itertools import groupby
 from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation.store import Row
 
+TABLES = 'target.md'
 _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average precision',
                     'recall at 100 % precision', 'MCC'),
           'live': ('loops / new places', 'balanced accuracy', '95 % interval', 'precision',

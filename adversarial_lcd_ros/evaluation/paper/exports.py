@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.summaries import Cell
+from adversarial_lcd_ros.evaluation.paper.summaries import KIND, SCHEMA, Cell
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
+from adversarial_lcd_ros.evaluation.results import SUMMARY, summary_document
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.files import write_text
+from adversarial_lcd_ros.files import write_json, write_text
 
-SUMMARY, CELLS_CSV, SUMMARY_CSV, TABLES_TEX = (
-    'summary.json', 'cells.csv', 'summary.csv', 'tables.tex')
+CELLS_CSV, SUMMARY_CSV, TABLES_TEX = 'cells.csv', 'summary.csv', 'tables.tex'
 _LATEX = {'\\': r'\textbackslash{}', '&': r'\&', '%': r'\%', '$': r'\$', '#': r'\#', '_': r'\_',
           '{': r'\{', '}': r'\}', '~': r'\textasciitilde{}', '^': r'\textasciicircum{}',
           '<': '$<$', '>': '$>$', '|': '$|$', '"': "''",
@@ -26,7 +25,7 @@ _TEX_HEAD = """\
 """
 
 
-def write_exports(folder: Path, rows: Iterable[Row], cells: Sequence[Cell],
+def write_exports(folder: Path, rows: Sequence[Row], cells: Sequence[Cell],
                   tables: Sequence[DeclineTable]) -> list[Path]:
     """
     Write summary.json, summary.csv, cells.csv and tables.tex; return their paths.
@@ -35,7 +34,7 @@ def write_exports(folder: Path, rows: Iterable[Row], cells: Sequence[Cell],
     ----------
     folder : Path
         Results folder.
-    rows : iterable of mapping
+    rows : sequence of mapping
         One a cell and seed: cells.csv, without the frames.
     cells : sequence of dict
         From ``summarise_cells``: summary.json and summary.csv.
@@ -45,10 +44,10 @@ def write_exports(folder: Path, rows: Iterable[Row], cells: Sequence[Cell],
     """
     plain = [{name: value for name, value in row.items() if name != 'frame_results'}
              for row in rows]
-    texts = {SUMMARY: json.dumps(list(cells), indent=2, allow_nan=False) + '\n',
-             TABLES_TEX: _TEX_HEAD + '\n'.join(latex_table(table) for table in tables)}
-    for name, text in texts.items():
-        write_text(folder / name, text)
+    # The keys tell which of the cells in the folder the summary is of.
+    keys = [row['key'] for row in rows if 'key' in row]
+    write_json(folder / SUMMARY, summary_document(KIND, SCHEMA, cells, {'cells': keys}))
+    write_text(folder / TABLES_TEX, _TEX_HEAD + '\n'.join(latex_table(table) for table in tables))
     flat = [{**cell, 'ci95': None, **_bounds(cell)} for cell in cells]
     for line in flat:
         del line['ci95']

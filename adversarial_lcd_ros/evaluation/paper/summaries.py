@@ -26,6 +26,7 @@ from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
+KIND, SCHEMA = 'frames', 4  # of summary.json
 OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle', 'mode',

@@ -14,6 +14,7 @@ from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_tem
 from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
 from adversarial_lcd_ros.evaluation.replay import plots
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, read_records, runs_of
+from adversarial_lcd_ros.evaluation.replay.summary import from_document
 from adversarial_lcd_ros.evaluation.results import (
     CONFIGURATION,
     ENVIRONMENT,
@@ -70,7 +71,8 @@ def report_folder(folder: Path) -> Path:
         A file of the folder is missing or damaged.
 
     """
-    return _render(folder, read_json(folder / SUMMARY), read_records(folder / RECORDS))
+    return _render(folder, from_document(read_json(folder / SUMMARY)),
+                   read_records(folder / RECORDS))
 
 
 def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord]) -> Path:

@@ -33,7 +33,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.report import write_report
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.evaluation.results import RECORDS, SUMMARY, ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
@@ -43,6 +43,7 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     open_graphs,
 )
 from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
@@ -123,6 +124,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
                               'loop; import it again with --ground-truth')
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
     frames = Replay(bag, plan.replay).frame_count
+    target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
     folder = ResultsFolder.create(output)
     runs = _replay(bag, sequence, plan, frames, folder.path / RECORDINGS, tell)
     tell('labels, figures and pictures')
@@ -207,7 +209,7 @@ def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
            pictures: Sequence[Picture]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed)
-    folder.write_json(SUMMARY, summary)
+    folder.write_json(SUMMARY, as_document(summary))
     write_records(folder.path / RECORDS, records)
     write_report(folder.path, summary, records, pictures)
 

@@ -21,8 +21,9 @@ from adversarial_lcd_ros.evaluation.metrics import (
     right,
 )
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
+from adversarial_lcd_ros.evaluation.results import summary_document
 
-SCHEMA = 1
+KIND, SCHEMA = 'replay', 2
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
               graphs: GraphStatistics, seed: int,
               block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
     """
-    Return the content of summary.json; undefined figures are None.
+    Return the figures of an evaluation (``as_document``: summary.json); undefined ones are None.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
     block = intervals.block_frames(column(clean, 'stamp_ns'), block_s)
     kinds = Counter(record.kind for record in clean)
     return {
-        'schema': SCHEMA, 'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
+        'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
         'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
         'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
         'negatives': kinds['negative'],
@@ -90,6 +91,34 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
         'seed': seed,
         'bootstrap': {'block_s': block_s, 'block_frames': block, 'blocks': len(clean) / block,
                       'replicates': intervals.REPLICATES, 'level': intervals.LEVEL}}
+
+
+def as_document(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a summary as it stands in summary.json: rows are runs, the clean one first."""
+    rows = [{'name': CLEAN, **summary['clean']}, *summary['attacks']]
+    return summary_document(KIND, SCHEMA, rows, {
+        name: value for name, value in summary.items() if name not in ('clean', 'attacks')})
+
+
+def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return the summary that ``as_document`` was given.
+
+    Raises
+    ------
+    EvaluationError
+        The document is of something else.
+
+    """
+    found = document.get('kind'), document.get('schema')
+    if found != (KIND, SCHEMA) or not document.get('rows'):
+        raise EvaluationError(f'summary.json is of the kind {found[0]!r}, schema {found[1]!r}: '
+                              f'expected {KIND!r}, {SCHEMA}, with rows; run the evaluation again')
+    clean, *attacks = document['rows']
+    rest = {name: value for name, value in document.items()
+            if name not in ('kind', 'schema', 'rows')}
+    return {**rest, 'clean': {name: value for name, value in clean.items() if name != 'name'},
+            'attacks': attacks}
 
 
 def run_metrics(run: Sequence[QueryRecord]) -> Metrics:

@@ -1,0 +1,72 @@
+"""A finished results folder of every kind, from made-up decisions."""
+
+from paper_factory import make_row
+from test_report import ATTACKS, COUNT, decide, make_labels, make_runs
+
+from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.evaluation import results
+from adversarial_lcd_ros.evaluation.detectors import run as targets
+from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
+from adversarial_lcd_ros.evaluation.replay.records import make_records, write_records
+from adversarial_lcd_ros.evaluation.replay.report import write_report
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.store import open_store
+
+KINDS = ('replay', 'frames', 'targets')
+
+
+def replay(path, *, found=range(30, 60), lcd=None, labels=None):
+    """Evaluate two made-up attacks on two walks; ``found``: frames with a loop before them."""
+    made = folder(path, [lcd or LcdConfig(), labels or LabelConfig(), *ATTACKS.values()])
+    records = make_records(make_labels(), decide(found), make_runs())
+    summary = summarise('walks', records, ATTACKS,
+                        GraphStatistics.of([300] * COUNT, [900] * COUNT), seed=1)
+    made.write_json(results.SUMMARY, as_document(summary))
+    write_records(path / results.RECORDS, records)
+    write_report(path, summary, records, [])
+    return path
+
+
+def frames(path, *, power=0.3, sequences=('tour', 'desk'), lcd=None, labels=None):
+    """Return cells of made-up attacks; ``power``: their chance to turn a decision over."""
+    made = folder(path, [lcd or LcdConfig(), labels or LabelConfig()])
+    threshold = (lcd or LcdConfig()).threshold
+    with open_store(path) as store:
+        for sequence in sequences:
+            for seed in (42, 43):
+                store.add(f'{sequence} {seed}', make_row(
+                    sequence, perturbation='recall', surrogate='none', power=power, seed=seed,
+                    threshold=threshold))
+        store.add('of other settings', make_row('tour', seed=1))
+        write_paper_report(made.path, [row for key, row in store.rows.items()
+                                       if key != 'of other settings'])
+    return path
+
+
+def targets_folder(path, *, accuracy=0.75, lcd=None, labels=None):
+    """Return a row of a target on pairs, and one live; ``accuracy``: balanced, of both."""
+    settings = {'lcd': {'threshold': (lcd or LcdConfig()).threshold}}
+    made = folder(path, [], {'sequences': [{'source': 'tour', **settings}]})
+    row = {'sequence': 'tour', 'target': 'wl', 'nodes': 300, 'nodes_mean': 299.5, 'frames': 60,
+           'scored': [0, 1], 'trained_on': False, 'references_trained_on': False,
+           'geometric_check': False, 'labels': {'rule': (labels or LabelConfig()).rule},
+           'positives': 9, 'negatives': 9, 'balanced_accuracy': accuracy, 'ci95': [0.5, 0.875],
+           'average_precision': 0.9, 'recall_at_100_precision': None, 'mcc': 0.5,
+           'precision': 0.9, 'recall': 0.8}
+    rows = [{**row, 'protocol': 'pairs', 'n_pairs': 18, 'distinct_pairs': 17, 'seeds': 1},
+            {**row, 'protocol': 'live', 'n_frames': 60, 'wrong_matches': 1,
+             'latency_to_first_closure_s': 2.0}]
+    made.write_json(results.SUMMARY, results.summary_document(
+        targets.KIND, targets.SCHEMA, rows))
+    return path
+
+
+def folder(path, sections, extra=None):
+    """Return a results folder with settings and versions and nothing else."""
+    path.mkdir(parents=True)
+    made = results.ResultsFolder(path)
+    made.write_setup(sections, ['adversarial-lcd', 'evaluate'], 1, extra)
+    return made
+
+
+MAKERS = dict(zip(KINDS, (replay, frames, targets_folder), strict=True))
