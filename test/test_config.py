@@ -14,7 +14,6 @@ from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS
 from adversarial_lcd_ros.attack.surrogates import SURROGATES
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.settings import (
     NODE_CONFIGS,
     SECTIONS,
@@ -191,6 +190,5 @@ def test_nodes_take_params_yaml_in_any_namespace(namespace):
 
 
 def test_choices_are_the_tables():
-    assert set(settings_of.TARGETS) == set(TARGETS)
     assert set(settings_of.SURROGATES) == {*SURROGATES, 'none'}
     assert set(settings_of.PERTURBATIONS) == {*PERTURBATIONS, 'recall'}

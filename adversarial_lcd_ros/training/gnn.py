@@ -6,7 +6,7 @@ PyTorch is an extra, adversarial_lcd_ros[gnn]; only this module needs it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.lcd.targets.gnn import INPUTS, OUTPUT, network_inputs
 from adversarial_lcd_ros.lcd.views import View, match_nodes
-from adversarial_lcd_ros.training.pair_scores import LabelledPairs
+from adversarial_lcd_ros.training.networks import Trainer
+from adversarial_lcd_ros.training.pair_scores import LabelledPairs, Progress
 
 if TYPE_CHECKING:
     import torch
@@ -27,7 +28,6 @@ HIDDEN, EMBEDDING = 64, 32
 LEARNING_RATE, WEIGHT_DECAY = 3e-3, 1e-4
 OPSET = 14
 
-Progress = Callable[[int, int], None]
 Layers = list[tuple['torch.nn.Linear', 'torch.nn.Linear']]
 
 
@@ -41,30 +41,35 @@ def require_pytorch() -> None:
                          '"adversarial_lcd_ros[gnn]", or leave it out of --targets') from error
 
 
-def train_gnn(sequences: Sequence[LabelledPairs], path: Path, seed: int,
+class GnnTrainer(Trainer):
+    """Trains with PyTorch; ModelError without it."""
+
+    def __init__(self) -> None:
+        require_pytorch()
+
+    def train(self, sequences: Sequence[LabelledPairs], path: Path, seed: int,
               progress: Progress | None = None) -> dict[str, Any]:
-    """
-    Train the network on labelled pairs, write it as ONNX, and return what its card says.
+        """
+        Train the network on labelled pairs, write it as ONNX, and return what its card says.
 
-    An epoch is 2 steps of 48 pairs from each sequence, half of them loops.
+        An epoch is 2 steps of 48 pairs from each sequence, half of them loops.
 
-    Parameters
-    ----------
-    sequences : sequence of LabelledPairs
-    path : Path
-        ONNX file to write.
-    seed : int
-        Of weights and draws: same pairs, same seed, same bytes on one machine.
-    progress : callable, optional
-        Called with epochs done and to do.
+        Parameters
+        ----------
+        sequences : sequence of LabelledPairs
+        path : Path
+            ONNX file to write.
+        seed : int
+            Of weights and draws: same pairs, same seed, same bytes on one machine.
+        progress : callable, optional
+            Called with epochs done and to do.
 
-    Raises
-    ------
-    ModelError
-        PyTorch or onnx is not installed.
+        """
+        return _train(sequences, path, seed, progress)
 
-    """
-    require_pytorch()
+
+def _train(sequences: Sequence[LabelledPairs], path: Path, seed: int, progress: Progress | None
+           ) -> dict[str, Any]:
     import torch
 
     torch.manual_seed(seed)

@@ -9,9 +9,10 @@ from typing import Any, TypeVar
 
 import yaml
 
-from adversarial_lcd_ros.config import TARGETS, BuilderConfig, Config, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.recipes import find_recipe
+from adversarial_lcd_ros.registry import TARGETS
 
 ConfigT = TypeVar('ConfigT', bound=Config)
 _KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels')
@@ -104,10 +105,11 @@ def _sequence(source: str, entry: Mapping[str, Any], choices: Choices) -> Target
     builder = _merged(BuilderConfig, entry.get('builder'), choices.builder)
     nodes = choices.nodes or tuple(entry.get('nodes') or (builder.features,))
     targets = choices.targets or tuple(entry.get('targets') or TARGETS)
-    unknown = sorted(set(targets) - set(TARGETS))
-    if unknown:
-        raise ConfigError(f'{source}: no target {", ".join(unknown)}; there are: '
-                          f'{", ".join(TARGETS)}')
+    for target in targets:
+        try:
+            TARGETS.check(target)
+        except ConfigError as error:
+            raise ConfigError(f'{source}: {error}') from error
     return TargetSequence(source, builder, _merged(LcdConfig, entry.get('lcd'), choices.lcd),
                           _merged(LabelConfig, entry.get('labels'), choices.labels), nodes,
                           targets, _part(source, entry.get('scored', (0, 1))))

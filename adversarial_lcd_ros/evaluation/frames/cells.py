@@ -21,7 +21,8 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
-from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path, target_path
+from adversarial_lcd_ros.lcd.targets import decision_path
+from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
@@ -122,7 +123,7 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
 
 
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
-    files = [target_path(lcd.model, target)
+    files = [decision_path(lcd.model, target)
              for target in dict.fromkeys((cell.target, cell.asked_target))]
     if cell.attack.mode == 'surrogate':
         chosen = cell.attack.surrogate_data

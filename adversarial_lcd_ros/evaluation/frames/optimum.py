@@ -94,7 +94,7 @@ class Optimum:
 
     def _loss(self, graph: MultiTierGraph, is_loop: bool) -> float:
         """Return L of Eq. (1): log odds against the detector's answer to the clean graph."""
-        logit = float(self.detector.log_odds(graph).max())
+        logit = self.detector.verdict_log_odds(graph)
         return -logit if is_loop else logit
 
 

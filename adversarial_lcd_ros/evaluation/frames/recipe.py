@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from adversarial_lcd_ros.config import (
-    TARGETS,
     AttackConfig,
     BuilderConfig,
     Config,
@@ -33,6 +32,7 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+from adversarial_lcd_ros.registry import TARGETS
 
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
@@ -48,7 +48,7 @@ class CellConfig(Config):
     target: str = setting('wl', 'The detector that is attacked.', choices=TARGETS)
     asked_target: str = setting(
         '', 'Transfer: the detector that answers queries; empty: the one attacked.',
-        choices=('', *TARGETS))
+        choices=TARGETS, empty=True)
     oracle: str = setting(
         'soft', 'soft: answers with probabilities; hard: decisions only.', choices=ORACLES)
     threshold: float = setting(

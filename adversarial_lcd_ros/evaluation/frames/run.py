@@ -30,17 +30,15 @@ from adversarial_lcd_ros.evaluation.results import environment
 from adversarial_lcd_ros.evaluation.store import CellStore
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.workers import Run
-from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.lcd.targets import decision_path
+from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.training.model_folder import trained_on
 
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
-# What takes how long, seconds on one core (docs/evaluation.md), by the target that is asked: a
-# query of a graph of 300 nodes, with its share of the search, and a flip scored by the yardstick.
+# Seconds on one core (docs/evaluation.md): of a frame and of a walk; classes say the rest of them.
 # They only tell how long a sweep may take.
-_QUERY_S = {'anchored': 0.6e-3, 'objects': 2.5e-3, 'wl_exact': 1.3e-3, 'gnn': 3.5e-3, '': 0.4e-3}
-_SCORE_S = {'anchored': 8e-6, 'objects': 40e-6, 'wl_exact': 1.3e-3, 'gnn': 3.5e-3, '': 0.3e-6}
 _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
 # Recall groups flips, and does not spend its queries one by one.
 _RECALL_SHARE = 0.15
@@ -168,12 +166,13 @@ def _expected_s(cell: Cell, nodes: float) -> float:
     """Return about how long a frame takes on one core, if the attack spends its budget."""
     edits = edit_budget(round(nodes), cell.attack.ratio)
     if cell.perturbation == Optimum.name:
-        return _FRAME_S + edits * nodes * nodes / 2 * _SCORE_S.get(cell.target, _SCORE_S[''])
+        flip_s: float = TARGETS[cell.target].flip_s
+        return _FRAME_S + edits * nodes * nodes / 2 * flip_s
     queries = min(edits * cell.attack.queries_per_edit, cell.attack.max_queries)
     asked = float(queries) if cell.attack.mode == 'query' else 0.0
     if cell.perturbation == 'recall':
         asked *= _RECALL_SHARE
-    query_s = _QUERY_S.get(cell.asked_target, _QUERY_S[''])
+    query_s: float = TARGETS[cell.asked_target].query_s
     return _FRAME_S + asked * query_s * nodes / _NODES
 
 
@@ -214,7 +213,7 @@ def run_task(task: Task) -> tuple[list[tuple[str, Row]], float]:
         graphs = load_stream_graphs(task.graphs)
         found = attack_frames(graphs, task.sample, task.cells, task.lcd, task.seed)
     rows = [(key, {**make_row(cell, task.seed, task.sequence, results),
-                   'trained_on': trained_on(target_path(task.lcd.model, cell.target),
+                   'trained_on': trained_on(decision_path(task.lcd.model, cell.target),
                                             task.graphs.source),
                    'versions': versions_digest()})
             for key, cell, results in zip(task.keys, task.cells, found, strict=True)]

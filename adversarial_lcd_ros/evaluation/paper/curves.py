@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.plots import Curve
 from adversarial_lcd_ros.evaluation.paper.summaries import (
@@ -21,6 +20,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import SETTING
+from adversarial_lcd_ros.registry import TARGETS
 
 _POINTS = 120
 _SHARED = tuple(name for name in SETTING if name not in ('target', 'mode'))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
@@ -13,6 +12,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     is_attackable,
 )
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
+from adversarial_lcd_ros.registry import TARGETS
 
 _NONE = '-'
 

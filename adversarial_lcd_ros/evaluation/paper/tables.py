@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.printed import (
     BUDGET_TABLE,
@@ -28,6 +27,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     is_attackable,
     summarise_methods,
 )
+from adversarial_lcd_ros.registry import TARGETS
 
 PAPER_RATIO = 3e-4
 PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper.printed import BUDGET_TABLE
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
 from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM, Cell, is_attackable
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
+from adversarial_lcd_ros.registry import TARGETS
 
 PAPER_SEEDS = 10
 _FEW_FRAMES = 30

@@ -7,7 +7,7 @@ of a few edges leave as it was.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,11 +156,3 @@ def assign_objects(cosine: NDArray[np.float64]) -> tuple[
     chosen = cosine[rows, columns]
     kept = chosen > 0
     return rows[kept], columns[kept], chosen[kept]
-
-
-def match_objects(query: View, nodes: Comparison) -> Iterator[tuple[
-        NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]:
-    """Yield for each reference what ``assign_objects`` returns."""
-    cosine = object_cosines(query, nodes)
-    for place in range(len(nodes)):
-        yield assign_objects(cosine[:, nodes.objects_of(place)])
