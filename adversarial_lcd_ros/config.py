@@ -13,10 +13,16 @@ import math
 from typing import Any, ClassVar, TypeVar
 
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.registry import DEFENCES, NONE, TARGETS, Table
+from adversarial_lcd_ros.registry import (
+    DEFENCES,
+    NONE,
+    PERTURBATIONS,
+    SEARCHES,
+    SURROGATES,
+    TARGETS,
+    Table,
+)
 
-PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
-SURROGATES = ('svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes', 'svr', 'ard', 'none')
 MODES = ('query', 'surrogate', 'pass')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
@@ -192,13 +198,15 @@ class AttackConfig(Config):
     title: ClassVar[str] = 'attacker'
 
     mode: str = setting(
-        'query', 'query: query-guided; surrogate: no queries, by a surrogate trained beforehand; '
-        'pass: forward unchanged.', choices=MODES)
+        'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
+        'beforehand; pass: forward unchanged.', choices=MODES)
+    search: str = setting(
+        'stepwise', 'How flips are looked for: flip after flip as in the paper, or by our own '
+        'recall.', choices=SEARCHES)
     perturbation: str = setting(
-        'eigencentrality', 'How candidate flips are chosen; recall is our own and the others are '
-        'those of the paper.', choices=PERTURBATIONS)
+        'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
-        'svm_rbf', 'Model that predicts the attack loss of a perturbed graph.',
+        'svm_rbf', 'Stepwise: model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
     gamma: str = setting(
         'paper', 'Width of the kernels rbf and poly: 1 / (2 sigma^2) as in Eq. (8), or '

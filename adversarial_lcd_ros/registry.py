@@ -39,7 +39,7 @@ class Table:
     group : str
         Of entry points; '': a table that is closed.
     moved : mapping of str to str
-        Names of earlier releases, and what to write instead.
+        Names that are looked for here, and what to write instead.
 
     """
 
@@ -87,12 +87,12 @@ class Table:
         """
         return _find(self, name)
 
-    def facts(self, name: str) -> type[Any]:
-        """Return the class of that name; the base, which has the usual facts, if it is gone."""
+    def look_up(self, name: str) -> type[Any] | None:
+        """Return the class of that name; None if there is none, or none any more."""
         try:
             return self.find(name)
         except ConfigError:
-            return self._base()
+            return None
 
     def _base(self) -> type[Any]:
         found: type[Any] = load(self.noun, f'{_PACKAGE}.{self.base}')
@@ -102,6 +102,8 @@ class Table:
         """Return ``package.module:Class`` of a name."""
         if self.entries.get(name):
             return f'{_PACKAGE}.{self.base.rpartition(".")[0]}.{self.entries[name]}'
+        if name in self.entries:
+            raise ConfigError(f'{self.noun} {name!r} is none')
         if self.group and ':' in name:
             return name
         there = entry_points(group=f'{_PACKAGE}.{self.group}') if self.group else ()
@@ -109,7 +111,7 @@ class Table:
             if entry.name == name:
                 return entry.value
         if name in self.moved:
-            raise ConfigError(f'no {self.noun} {name!r} any more: {self.moved[name]}')
+            raise ConfigError(f'{name!r} is no {self.noun}: {self.moved[name]}')
         own = (', or one of your own as package.module:Class' if self.group else '')
         raise ConfigError(f'no {self.noun} {name!r}; there are: '
                           f'{", ".join([*self.entries, *(entry.name for entry in there)])}{own}')
@@ -166,3 +168,32 @@ DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
     NONE: '',
     'geometric_check': 'geometric_check:GeometricCheck',
 }, 'defences')
+
+SEARCHES = Table('search', 'attack.search:Search', {
+    'stepwise': 'searches.stepwise:Stepwise',
+    'recall': 'searches.recall:Recall',
+}, 'searches', {'optimum': 'it looks into the detector, and is for recipes of the protocol '
+                           '"frames" alone'})
+
+PERTURBATIONS = Table('perturbation', 'attack.perturbations.base:Perturbation', {
+    'eigencentrality': 'eigencentrality:Eigencentrality',
+    'random_walk': 'random_walk:RandomWalk',
+    'shortest_path': 'shortest_path:ShortestPath',
+    'random_flip': 'random_flip:RandomFlip',
+}, 'perturbations', {name: f'it is a search, write "search: {name}" instead'
+                     for name in ('recall', 'optimum')})
+
+SURROGATES = Table('surrogate', 'attack.surrogates.base:Surrogate', {
+    'svm_rbf': 'svm_rbf:SvmRbf',
+    'svm_linear': 'svm_linear:SvmLinear',
+    'svm_poly': 'svm_poly:SvmPoly',
+    'naive_bayes': 'naive_bayes:NaiveBayes',
+    'svr': 'svr:SupportVectorRegression',
+    'ard': 'ard:RelevanceDetermination',
+    NONE: '',
+}, 'surrogates')
+
+# Attacks of an evaluation that look into the detector, in the place of a search.
+YARDSTICKS = Table('yardstick', 'evaluation.frames.optimum:Optimum', {
+    'optimum': 'optimum:Optimum',
+})

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.surrogate_data import data_path
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.evaluation import metrics
+from adversarial_lcd_ros.evaluation.methods import COLUMNS, attack_columns, method_of
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 from adversarial_lcd_ros.lcd.targets import decision_path
-from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
+from adversarial_lcd_ros.registry import YARDSTICKS
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
@@ -32,7 +34,7 @@ SCHEMA = 3
 ORACLES = ('soft', 'hard')
 _TRACE_POINTS = 8
 # Attack settings that have columns of their own.
-_COLUMNS = ('mode', 'perturbation', 'surrogate', 'ratio', 'edits', 'queries_per_edit', 'seed')
+_COLUMNS = ('mode', *COLUMNS, 'ratio', 'edits', 'queries_per_edit', 'seed')
 # Files count by their content.
 _FILES = ('surrogate_data',)
 
@@ -44,10 +46,10 @@ class Cell:
 
     Attributes
     ----------
-    perturbation : str
-        That of ``attack``, or 'optimum', the yardstick.
+    search : str
+        That of ``attack``, or a yardstick in its place.
     attack : AttackConfig
-        Its seed does not count.
+        Its seed does not count, nor do settings that the search does not use.
     target : str
         The detector that judges.
     asked_target : str
@@ -67,7 +69,7 @@ class Cell:
 
     """
 
-    perturbation: str
+    search: str
     attack: AttackConfig
     target: str
     asked_target: str
@@ -77,6 +79,17 @@ class Cell:
     seeds: int
     name: str = ''
     threshold: float = LcdConfig.threshold
+
+    @property
+    def method(self) -> str:
+        """What chooses the flips: a perturbation, or else a search."""
+        return method_of(self._columns)
+
+    @property
+    def _columns(self) -> dict[str, str]:
+        if self.search in YARDSTICKS:
+            return {**dict.fromkeys(COLUMNS, ''), 'search': self.search}
+        return attack_columns(self.attack)
 
     @property
     def variant(self) -> str:
@@ -89,8 +102,7 @@ class Cell:
     @property
     def settings(self) -> dict[str, Any]:
         """What tells this cell from others, apart from its sample; the columns of a row."""
-        return {'target': self.target, 'asked_target': self.asked_target,
-                'perturbation': self.perturbation, 'surrogate': self.attack.surrogate,
+        return {'target': self.target, 'asked_target': self.asked_target, **self._columns,
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
                 'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant}
@@ -125,9 +137,8 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
     files = [decision_path(lcd.model, target)
              for target in dict.fromkeys((cell.target, cell.asked_target))]
-    if cell.attack.mode == 'surrogate':
-        chosen = cell.attack.surrogate_data
-        files.append(Path(chosen) if chosen else model_path(SURROGATE_DATA))
+    if cell.attack.mode == 'surrogate' and cell.settings['surrogate']:
+        files.append(data_path(cell.attack))
     return files
 
 

@@ -24,9 +24,10 @@ from adversarial_lcd_ros.evaluation.replay.records import AttackRun
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer
+from adversarial_lcd_ros.shown import Shown
 
 
-class Optimum:
+class Optimum(Shown):
     """
     At each step the one flip that moves the log odds most towards the opposite decision.
 
@@ -40,6 +41,11 @@ class Optimum:
     """
 
     name: ClassVar[str] = 'optimum'
+    title: ClassVar[str] = 'optimum (yardstick)'
+    rank: ClassVar[int] = 200
+    colour: ClassVar[str] = '#33373d'
+    marker: ClassVar[str] = '*'
+    dash: ClassVar[str] = '--'
 
     def __init__(self, detector: LoopClosureDetector, config: AttackConfig | None = None) -> None:
         self.detector = detector
