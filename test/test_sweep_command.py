@@ -58,14 +58,15 @@ def test_it_announces_runs_reports_and_goes_on(tmp_path, command, capsys):
 
 
 def test_settings_of_the_command_line_win(tmp_path, command):
-    assert command('--perturbation', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
+    assert command('--search', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
     entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
-    assert (entry['perturbation'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
+    assert (entry['search'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
+    assert (entry['perturbation'], entry['surrogate']) == ('', '')
 
 
 def test_cells_of_other_settings_are_kept_and_not_reported(tmp_path, command, capsys):
     for candidates in ('5', '4'):
-        assert command('--perturbation', 'optimum', '--seeds', '1', '--lcd-candidates',
+        assert command('--search', 'optimum', '--seeds', '1', '--lcd-candidates',
                        candidates) == 0
     assert 'models or code: 1;' in capsys.readouterr().err
     assert len((tmp_path / 'out' / 'cells.jsonl').read_text().splitlines()) == 2

@@ -76,9 +76,17 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     assert command('--targets', 'edges', '--lcd-geometric-check',
                    '--lcd-geometric-inliers', '21') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
-    assert [row['geometric_check'] for row in rows] == [False, True]
-    assert rows[1]['recall'] == 0
+    assert [row['geometric_check'] for row in rows] == [True, True]
+    assert [row['recall'] for row in rows] == [0, 0]
     assert '| walk, geometric check |' in capsys.readouterr().out
+
+
+def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
+    assert command('--targets', 'edges', '--lcd-defences', 'own_defences:IgnoresEdges') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
+    assert [row['defences'] for row in rows] == ['own_defences:IgnoresEdges'] * 2
+    assert [row['recall'] for row in rows] == [0, 0]
+    assert '| walk, own_defences:IgnoresEdges |' in capsys.readouterr().out
 
 
 def test_live_and_pairs_see_the_threshold(tmp_path, command):

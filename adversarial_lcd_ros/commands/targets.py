@@ -17,8 +17,9 @@ from adversarial_lcd_ros.commands.common import (
     progress_bar,
     tell,
 )
-from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.settings import add_config_options, add_models_option, chosen_settings
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def add(commands: Commands) -> None:
                         help='where the sequences of a recipe are (default: %(default)s)')
     parser.add_argument('--output', type=Path, default=Path('results/target'), metavar='FOLDER',
                         help='rows that are there are not run again (default: %(default)s)')
-    parser.add_argument('--targets', nargs='+', choices=TARGETS, metavar='NAME',
+    parser.add_argument('--targets', nargs='+', metavar='NAME',
                         help=f'those to evaluate (default: {" ".join(TARGETS)}, or what the '
                         'recipe says)')
     parser.add_argument('--protocols', nargs='+', choices=PROTOCOLS, default=PROTOCOLS,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from adversarial_lcd_ros.evaluation.methods import method_of, surrogate_facts
+from adversarial_lcd_ros.registry import NONE
+
 UNDEFINED = 'n/a'
 _NARROW_SPACE = '\u202f'  # does not break the line
-_SURROGATE = {'svm_rbf': 'SVM-RBF', 'svm_linear': 'SVM-linear', 'svm_poly': 'SVM-polynomial',
-              'naive_bayes': 'naive Bayes', 'svr': 'SVR', 'ard': 'Bayesian ARD'}
 _MODE = {'query': 'query-guided', 'surrogate': 'surrogate only', 'pass': 'forwarded unchanged'}
 
 Attack = Mapping[str, Any]
@@ -20,20 +21,21 @@ def attack_title(attack: Attack) -> str:
         return str(attack['name'])
     if attack['mode'] == 'pass':
         return 'control: forwarded unchanged'
-    return f'{method_title(attack)}, {mode_title(attack["mode"])}'
+    unasked = attack['mode'] == 'surrogate' and not attack['surrogate']
+    return f'{method_title(attack)}, {"no queries" if unasked else mode_title(attack["mode"])}'
 
 
 def method_title(attack: Attack) -> str:
-    """Return perturbation and surrogate of an attack, in words."""
-    perturbation = str(attack['perturbation']).replace('_', ' ')
-    if attack['surrogate'] == 'none':
-        return perturbation
-    return f'{perturbation} + {surrogate_title(attack["surrogate"])}'
+    """Return what looks for the flips of an attack, in words: a surrogate only if one ran."""
+    title = method_of(attack).replace('_', ' ')
+    if attack['surrogate'] in ('', NONE):
+        return title
+    return f'{title} + {surrogate_title(attack["surrogate"])}'
 
 
 def surrogate_title(surrogate: str) -> str:
     """Return a surrogate in words."""
-    return _SURROGATE.get(surrogate, surrogate.replace('_', ' '))
+    return surrogate_facts(surrogate).title or surrogate.replace('_', ' ')
 
 
 def mode_title(mode: str) -> str:

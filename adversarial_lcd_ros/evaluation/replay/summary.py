@@ -12,6 +12,7 @@ import numpy as np
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.methods import attack_columns
 from adversarial_lcd_ros.evaluation.metrics import (
     FRAME_KINDS,
     Metrics,
@@ -147,7 +148,7 @@ def _attack_figures(name: str, config: AttackConfig, clean: Sequence[QueryRecord
     before, after = column(clean, 'outcome'), column(run, 'outcome')
     change = asdict(effect(kind, before, after))
     return {
-        'name': name, 'perturbation': config.perturbation, 'surrogate': config.surrogate,
+        'name': name, **attack_columns(config),
         'ratio': config.ratio, 'mode': config.mode, 'edit_kinds': config.edits,
         'seed': config.seed, 'decisions': len(run), **_effort(run),
         **_run_figures(run, block, seed), **change,
