@@ -22,7 +22,7 @@ from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.codec import LcdQuery
-from adversarial_lcd_ros.evaluation.replay.processes import environment
+from adversarial_lcd_ros.evaluation.replay.processes import node_environment
 from adversarial_lcd_ros.graph_sequences.bags import _graph_messages
 from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.endpoints import payload_qos
@@ -45,7 +45,7 @@ QUERY = {'mode': 'query', 'deadline_ms': DEADLINE_S * 1e3}
 @pytest.fixture(autouse=True)
 def loopback(monkeypatch):
     """Put this process and those that it starts into one domain, on this machine only."""
-    for name, value in environment().items():
+    for name, value in node_environment().items():
         monkeypatch.setenv(name, value)
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
         (str(Path(__file__).parents[1]), str(Path(__file__).parent))))

@@ -117,7 +117,7 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
-def environment() -> Mapping[str, str]:
+def node_environment() -> Mapping[str, str]:
     """Return the environment of the nodes: on this machine only, in a domain of their own."""
     return {**os.environ,
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
@@ -134,7 +134,8 @@ def _node(name: str, parameters: Path, arguments: Sequence[str], folder: Path,
     command = [sys.executable, '-m', f'adversarial_lcd_ros.nodes.{name}', '--ros-args',
                '--params-file', str(parameters), *arguments]
     with (folder / f'{name}.log').open('wb') as log:
-        process = subprocess.Popen(command, env=environment(), stdout=log, start_new_session=True,
+        process = subprocess.Popen(command, env=node_environment(), stdout=log,
+                                   start_new_session=True,
                                    stderr=None if keep_stderr else subprocess.STDOUT)
         try:
             yield process
