@@ -3,6 +3,7 @@
 import json
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -13,69 +14,10 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.registry import PERTURBATIONS, SEARCHES, TARGETS
 
-LAB = '''
-from dataclasses import replace
-
-import numpy as np
-
-from adversarial_lcd_ros.attack.perturbations import Perturbation
-from adversarial_lcd_ros.attack.search import Search
-from adversarial_lcd_ros.attack.surrogates import Surrogate
-from adversarial_lcd_ros.lcd.defences import Defence
-from adversarial_lcd_ros.lcd.targets import Target
-
-
-class Degree(Perturbation):
-    """Pairs with the largest sum of degrees first."""
-
-    name = 'degree'
-
-    def propose(self, graph, count, allowed, rng):
-        degree = np.bincount(graph.edge.ravel(), minlength=graph.node_count)
-        pairs = np.stack(np.triu_indices(graph.node_count, 1), axis=1)
-        order = np.argsort(-degree[pairs].sum(axis=1), kind='stable')
-        return allowed.filter(graph, pairs[order])[:count]
-
-
-class Classes(Target):
-    """How many nodes of each class, or visual word, both graphs have; and how many edges."""
-
-    name = 'classes'
-    channels = ('classes', 'edges')
-
-    def compare(self, query, nodes):
-        mine, rows = np.bincount(query.graph.label), []
-        for reference in nodes.references:
-            other = np.bincount(reference.graph.label)
-            size = min(len(mine), len(other))
-            edges = sorted((query.graph.edge_count, reference.graph.edge_count))
-            rows.append((np.minimum(mine[:size], other[:size]).sum() / max(mine.sum(), 1),
-                         edges[0] / max(edges[1], 1)))
-        return np.array(rows).reshape(len(nodes), 2)
-
-
-class DropsLongEdges(Defence):
-    """Judges a graph without the edges that are longer than a tenth of the diagonal."""
-
-    name = 'drops_long_edges'
-
-    def prepare(self, graph):
-        kept = graph.edge_length <= 0.1
-        return replace(graph, edge=graph.edge[kept], edge_length=graph.edge_length[kept])
-
-
-class Mean(Surrogate):
-    """Ranks by the first feature."""
-
-    name = 'mean'
-
-    def fit(self, features, gain):
-        return len(gain) > 1
-
-    def predict(self, features):
-        return features[:, 0]
-
-
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / 'docs/extending.md').read_text(encoding='utf-8')
+LAB = '\n\n'.join(re.findall(r'```python\n(.*?)```', PAGE, re.S))
+WRONG = '''
 class Nothing(Search):
     """Gives up."""
 
@@ -100,7 +42,7 @@ def lab(tmp_path, monkeypatch):
     folder = tmp_path / 'elsewhere'
     (folder / 'lab').mkdir(parents=True)
     (folder / 'lab/__init__.py').write_text('')
-    (folder / 'lab/mine.py').write_text(LAB)
+    (folder / 'lab/mine.py').write_text(LAB + WRONG)
     (folder / 'lab/broken.py').write_text('import nonesuch\n')
     info = folder / 'lab-1.0.dist-info'
     info.mkdir()
@@ -128,11 +70,10 @@ def command(tmp_path, lab, vocabulary):
         options = ['--config', str(settings)]
         if cached:
             options += ['--cache', str(tmp_path / 'cache'), '--jobs', '2']
-        root = str(Path(__file__).resolve().parents[1])
         done = subprocess.run(
             [sys.executable, '-m', 'adversarial_lcd_ros.cli', name, str(tmp_path / 'walk'),
              *options, *map(str, more)], capture_output=True, text=True, timeout=400, check=False,
-            env={**os.environ, 'PYTHONPATH': os.pathsep.join((str(lab), root))})
+            env={**os.environ, 'PYTHONPATH': os.pathsep.join((str(lab), str(ROOT)))})
         assert done.returncode == 0, done.stderr
     return run
 
@@ -166,7 +107,7 @@ def test_a_target_is_trained_measured_behind_a_defence_and_attacked(tmp_path, co
                       'attacks:\n'
                       '  - {perturbation: lab.mine:Degree, surrogate: lab.mine:Mean}\n'
                       '  - {perturbation: lab.mine:Degree, target: classes, surrogate: none}\n'
-                      '  - search: [nothing, optimum]\n')
+                      '  - search: [nothing, lab.mine:Climb, optimum]\n')
     losses = []
     for name, more in (('open', ()), ('shut', ('--lcd-defences', 'lab.mine:DropsLongEdges'))):
         command('evaluate', '--recipe', recipe, '--models', models, '--output', tmp_path / name,
@@ -174,9 +115,10 @@ def test_a_target_is_trained_measured_behind_a_defence_and_attacked(tmp_path, co
         rows = {row['search'] + row['perturbation'] + row['target']: row
                 for row in rows_of(tmp_path / name)}
         assert set(rows) == {'stepwiselab.mine:Degreeedges', 'stepwiselab.mine:Degreeclasses',
-                             'nothingedges', 'optimumedges'}
+                             'nothingedges', 'lab.mine:Climbedges', 'optimumedges'}
         assert rows['nothingedges']['surrogate'] == ''
         assert rows['nothingedges']['edits_mean'] == 0
+        assert rows['lab.mine:Climbedges']['queries_mean'] > 0
         assert rows['stepwiselab.mine:Degreeedges']['edits_mean'] > 0
         losses.append([frame['loss_after'] for frame in rows['optimumedges']['frame_results']])
     assert losses[0] != losses[1]  # the yardstick sees the defence
@@ -211,3 +153,13 @@ def test_an_entry_point_and_a_reference_are_one_class(lab):
 @pytest.mark.parametrize('table', [TARGETS, SEARCHES, PERTURBATIONS])
 def test_what_ships_is_what_its_table_says(table):
     assert [table.find(name).name for name in table] == list(table)
+
+
+def test_commands_of_the_page_name_its_classes_and_known_options():
+    named = set(re.findall(r'lab\.mine:(\w+)', PAGE))
+    assert named == {'Degree', 'Mean', 'Climb', 'Classes', 'DropsLongEdges'}
+    assert named <= set(re.findall(r'^class (\w+)', LAB, re.M))
+    done = subprocess.run([sys.executable, '-m', 'adversarial_lcd_ros.cli', 'evaluate', '--help'],
+                          capture_output=True, text=True, cwd=ROOT, check=True)
+    for option in re.findall(r'evaluate bags/flat_tour (--[\w-]+)', PAGE):
+        assert option in done.stdout
