@@ -12,8 +12,9 @@ import numpy as np
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, POSE, BagFile
 from adversarial_lcd_ros.sequences.frame import RAW_CHANNELS, Frame, open_compressed
+from adversarial_lcd_ros.sequences.pose_files import read_tum
 from adversarial_lcd_ros.sequences.sequence import Sequence, check_order
-from adversarial_lcd_ros.sequences.trajectory import Trajectory, read_trajectory
+from adversarial_lcd_ros.sequences.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.transforms import tf_trajectory
 
 TRUTH_TOPIC = '/ground_truth'
@@ -134,10 +135,10 @@ def _trajectory(bag: BagFile, ground_truth: Path | str | None,
     if ground_truth is not None:
         if str(ground_truth) in bag.of_type(POSE):
             return _poses(bag, str(ground_truth))
-        return read_trajectory(Path(ground_truth))
+        return read_tum(Path(ground_truth))
     beside = bag.path.parent / 'groundtruth.txt'
     if bag.path.is_file() and beside.exists():
-        return read_trajectory(beside)
+        return read_tum(beside)
     topics = bag.of_type(POSE)
     if TRUTH_TOPIC in topics:
         topics = [TRUTH_TOPIC]
