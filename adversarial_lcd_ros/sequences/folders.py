@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame, open_compressed
+from adversarial_lcd_ros.sequences.frame_poses import image_poses, read_poses
 from adversarial_lcd_ros.sequences.pose_files import (
     check_pose_matrix,
     matrix_trajectory,
     read_matrices,
-    read_tum,
 )
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.text_files import text_rows
@@ -65,7 +65,7 @@ def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
             raise SequenceError(f'{where}: there is no image {paths[-1]}')
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
-    trajectory = None if ground_truth is None else read_tum(ground_truth)
+    trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
     return _sequence(folder, paths, stamps, trajectory)
 
 
@@ -84,7 +84,7 @@ def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
     sample = _open(samples[0], 0, None)
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
-    trajectory = None if ground_truth is None else read_tum(ground_truth)
+    trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
 
     def read(wanted: range) -> Iterator[Frame]:
         for number in wanted:
@@ -98,19 +98,13 @@ def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None)
     """
     Open a folder of images in order of their names.
 
-    With ground truth and no rate, pose i belongs to image i and stamps it. With a rate, the
-    first image is taken with the first pose (or at 0), the others at this rate.
+    Where there is ground truth, ``image_poses`` tells which pose is that of which image.
     """
     paths = images_in(folder)
-    trajectory = None if ground_truth is None else read_tum(ground_truth)
-    if trajectory is not None and rate_hz is None:
-        if len(trajectory) != len(paths):
-            raise SequenceError(
-                f'{folder} holds {len(paths)} images, {ground_truth} {len(trajectory)} poses: '
-                'expected one pose per image, or the rate of the images in Hz, or "none"')
-        return _sequence(folder, paths, trajectory.stamp_ns, trajectory)
-    start_ns = 0 if trajectory is None else int(trajectory.stamp_ns[0])
-    return _sequence(folder, paths, start_ns + _ticks(len(paths), rate_hz), trajectory)
+    ticks = _ticks(len(paths), rate_hz)
+    if ground_truth is None:
+        return _sequence(folder, paths, ticks, None)
+    return _sequence(folder, paths, *image_poses(ground_truth, ticks, rate_hz is not None))
 
 
 def walk_folders(folder: Path, walks: dict[Path, list[Path]],

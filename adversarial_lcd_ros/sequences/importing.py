@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import heapq
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ import numpy as np
 
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
+from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
@@ -28,7 +31,18 @@ _TERMS = ('credits', 'license', 'licence')
 
 @dataclass(frozen=True)
 class ImportSummary:
-    """What an import has written."""
+    """
+    What an import has written.
+
+    Attributes
+    ----------
+    truth : str
+        Where the ground truth is from, or why there is none.
+    posed_frames, posed_s, path_m
+        Frames with a pose near them, the time from the first to the last of them, seconds, and
+        the length of the path between, metres; NaN for places by index.
+
+    """
 
     path: Path
     name: str
@@ -37,12 +51,27 @@ class ImportSummary:
     image_size: tuple[int, int]
     duration_s: float
     size_bytes: int
+    truth: str
+    posed_frames: int
+    posed_s: float
+    path_m: float
+
+    def coverage(self) -> str:
+        """Return in words how many frames have a pose, or why none has."""
+        if not self.posed_frames:
+            return f'no ground truth: {self.truth or "the source has none"}'
+        path = 'places by index' if math.isnan(self.path_m) else f'a path of {self.path_m:.2f} m'
+        return (f'{self.posed_frames} of {self.frames} frames have a pose, over '
+                f'{self.posed_s:.1f} s and {path}'
+                + (f'; ground truth: {self.truth}' if self.truth else ''))
 
 
 def import_sequence(source: Path | str, destination: Path | str, *,
                     progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
                     topic: str | None = None, ground_truth: Path | str | None = None,
-                    rate_hz: float | None = None, raw_as: str = JPEG) -> ImportSummary:
+                    rate_hz: float | None = None, raw_as: str = JPEG,
+                    truth: TruthOptions | None = None,
+                    stamps: str | None = None) -> ImportSummary:
     """
     Write a sequence as a rosbag2 in MCAP.
 
@@ -54,7 +83,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
 
     Parameters
     ----------
-    source, topic, ground_truth, rate_hz
+    source, topic, ground_truth, rate_hz, truth, stamps
         See ``open_sequence``.
     destination : Path or str
         Folder of the bag; it appears when it is complete, or not at all.
@@ -75,7 +104,8 @@ def import_sequence(source: Path | str, destination: Path | str, *,
     if raw_as not in (JPEG, PNG):
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
-        sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz)
+        sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz,
+                                 truth=truth, stamps=stamps)
         poses = list(pose_messages(sequence.trajectory, int(sequence.stamps_ns[0]),
                                    int(sequence.stamps_ns[-1])))
         frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
@@ -85,11 +115,19 @@ def import_sequence(source: Path | str, destination: Path | str, *,
             bag.write(message_topic, message_type, stamp_ns, cdr)
         for file in _terms(Path(source)):
             bag.attach(file)
-    path = Path(destination)
+    return _summary(Path(destination), sequence, len(poses))
+
+
+def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
+    stamps = sequence.stamps_ns
+    posed = stamps[sequence.posed]
+    path_m = (0.0 if sequence.trajectory is None or not len(posed)
+              else sequence.trajectory.at(posed).length_m)
     return ImportSummary(
-        path, sequence.name, sequence.frame_count, len(poses),
-        sequence.image_size, float(sequence.stamps_ns[-1] - sequence.stamps_ns[0]) / 1e9,
-        sum(file.stat().st_size for file in path.iterdir()))
+        path, sequence.name, sequence.frame_count, poses, sequence.image_size,
+        float(stamps[-1] - stamps[0]) / 1e9, sum(file.stat().st_size for file in path.iterdir()),
+        sequence.truth, len(posed), float(posed[-1] - posed[0]) / 1e9 if len(posed) else 0.0,
+        path_m)
 
 
 def _terms(source: Path) -> list[Path]:

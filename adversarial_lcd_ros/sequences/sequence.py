@@ -34,6 +34,8 @@ class Sequence:
         Returns an iterator of the frames of these numbers; use ``frames``.
     detections : Path or None
         Where the frames have no pictures: the file of what was detected in them.
+    truth : str
+        In words: where the ground truth is from, or why there is none.
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Sequence:
     trajectory: Trajectory | None
     read: Callable[[range], Iterator[Frame]]
     detections: Path | None = None
+    truth: str = ''
 
     def __post_init__(self) -> None:
         """Check the order of the frames, and that the ground truth is theirs."""
@@ -64,6 +67,13 @@ class Sequence:
     def frame_count(self) -> int:
         """Number of frames."""
         return len(self.stamps_ns)
+
+    @property
+    def posed(self) -> NDArray[np.bool_]:
+        """Tell for each frame whether a ground truth pose is near it, bool (n,)."""
+        if self.trajectory is None:
+            return np.zeros(self.frame_count, bool)
+        return self.trajectory.is_near(self.stamps_ns)
 
     def frames(self, start: int = 0, stop: int | None = None, stride: int = 1,
                ) -> Iterator[Frame]:

@@ -129,6 +129,13 @@ class Trajectory:
         return Trajectory(self.stamp_ns[kept], self.position[kept], self.quaternion[kept],
                           self.frame_id)
 
+    @property
+    def length_m(self) -> float:
+        """Length of the path from pose to pose, metres; NaN for a place index."""
+        if self.frame_id == PLACE_INDEX:
+            return float('nan')
+        return float(np.linalg.norm(np.diff(self.position, axis=0), axis=1).sum())
+
     def _nearest(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
         after = np.minimum(np.searchsorted(self.stamp_ns, stamps), len(self) - 1)
         before = np.maximum(after - 1, 0)
