@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 import sys
 from typing import Any, TypeAlias
 
@@ -83,6 +84,36 @@ def source_options(options: Namespace) -> dict[str, Any]:
     if options.extrinsics:
         truth['extrinsics'] = parse_extrinsics(options.extrinsics)
     return {**given, 'truth': TruthOptions(**truth)} if truth else given
+
+
+def imported_source(source: str, options: Namespace, *, replayed: bool = False) -> str:
+    """
+    Return a source that needs no more options: imported on the way where any was given.
+
+    Parameters
+    ----------
+    source : str
+        PATH or PATH@FROM:TO.
+    options : Namespace
+        With those of ``add_source_options``.
+    replayed : bool
+        The nodes are to replay it: it must be a bag as "import" writes it.
+
+    """
+    from adversarial_lcd_ros.errors import ConfigError
+    from adversarial_lcd_ros.sequences.on_the_way import imported
+    from adversarial_lcd_ros.sequences.part import SequencePart
+
+    given = source_options(options)
+    if not given and not replayed:
+        return source
+    path = SequencePart.parse(source).path
+    part = source.rpartition('@')[2] if path != Path(source) else ''
+    if part and replayed:
+        raise ConfigError(f'{source}: a replay takes a whole recording; expected {path}, with '
+                          '--replay-start-s and --replay-duration-s for a part of it')
+    bag = imported(path, given, tell=tell, bar=progress_bar)
+    return f'{bag}@{part}' if part else str(bag)
 
 
 @contextmanager

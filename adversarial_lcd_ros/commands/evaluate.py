@@ -13,6 +13,8 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_source_options,
+    imported_source,
     print_json,
     tell,
 )
@@ -46,11 +48,13 @@ def add(commands: Commands) -> None:
         'Replay a bag clean and attacked, or run a recipe of many attacks over sequences, and '
         'report what the attacks cost.', _evaluate)
     parser.add_argument('sources', nargs='+', metavar='SEQUENCE',
-                        help='bag with ground truth, made by "import" or "build"; with a recipe '
+                        help='recording of any form that "import" reads, imported on the way, or '
+                        'a bag made by "build"; with a recipe '
                         'of the protocol "frames" any number of bags or folders, also parts of '
                         'them (PATH@FROM:TO, PATH@0.5:1 is the second half)')
     _add_evaluation_options(parser, 'SEQUENCE [SEQUENCE ...] [OPTIONS]')
     evaluate_frames.add_options(parser)
+    add_source_options(parser)
 
 
 def add_demo(commands: Commands) -> None:
@@ -92,6 +96,7 @@ def _evaluate(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 
     if read_recipe(options.recipe)[1]['protocol'] == FRAMES:
+        options.sources = [imported_source(source, options) for source in options.sources]
         evaluate_frames.run(options)
         return
     evaluate_frames.refuse_options(options)
@@ -99,7 +104,7 @@ def _evaluate(options: Namespace) -> None:
         raise ConfigError(f'recipe {options.recipe} replays one bag, found '
                           f'{len(options.sources)}: name one, or a recipe of the protocol '
                           f'"{FRAMES}" such as paper')
-    _evaluate_bag(Path(options.sources[0]), options)
+    _evaluate_bag(Path(imported_source(options.sources[0], options, replayed=True)), options)
 
 
 def _demo(options: Namespace) -> None:

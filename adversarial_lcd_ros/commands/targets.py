@@ -13,8 +13,11 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_source_options,
+    imported_source,
     print_json,
     progress_bar,
+    source_options,
     tell,
 )
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
@@ -67,6 +70,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
     add_json_option(parser)
+    add_source_options(parser)
     add_models_option(parser)
     for config, prefix in _CONFIGS:
         add_config_options(parser, config, prefix)
@@ -123,8 +127,12 @@ def _sequences(options: Namespace) -> list[TargetSequence]:
     choices = Choices(builder, lcd, labels, tuple(options.nodes or ()),
                       tuple(options.targets or ()))
     if options.recipe:
+        if source_options(options):
+            raise ConfigError('how a recording is read is given for named sequences only: a '
+                              'recipe names its own')
         return recipe_sequences(options.recipe, options.data, choices)
-    return named_sequences(options.sources, choices)
+    return named_sequences([imported_source(source, options) for source in options.sources],
+                           choices)
 
 
 def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTask]:
