@@ -70,15 +70,28 @@ def interval(bounds: Sequence[float] | None, factor: float = 1.0) -> str:
     return ' to '.join(f'{round(factor * bound, 1) + 0.0:.1f}' for bound in bounds)
 
 
+def is_labelled(summary: Mapping[str, Any]) -> bool:
+    """Tell whether there was ground truth to score decisions by."""
+    return bool(summary.get('labelled', True))
+
+
 def strongest(summary: Mapping[str, Any]) -> Attack | None:
-    """Return the attack with the largest decline; None without attacks."""
+    """Return the attack that took, or without ground truth changed, most; None without any."""
     attacks: list[Attack] = summary['attacks']
+    if not is_labelled(summary):
+        return max(attacks, key=lambda attack: int(attack['changed']), default=None)
     return max(attacks, key=lambda attack: -1e9 if attack['decline_pp'] is None
                else attack['decline_pp'], default=None)
 
 
 def headline(summary: Mapping[str, Any]) -> str:
     """Return the main finding in one or two sentences."""
+    if not summary['nodes_mean']:
+        return (f'All {summary["graphs"]} graphs of {summary["sequence"]} are empty: no feature '
+                'and no object was found in the pictures. Nothing could be recognised or '
+                'attacked; the figures say nothing about the detector.')
+    if not is_labelled(summary):
+        return _headline_without_labels(summary)
     attack = strongest(summary)
     name, clean = summary['sequence'], summary['clean']
     if attack is None:
@@ -103,6 +116,21 @@ def headline(summary: Mapping[str, Any]) -> str:
             f'{interval(bounds)}), with {effort}. {_sentence(_changes(summary, attack))}.')
 
 
+def _headline_without_labels(summary: Mapping[str, Any]) -> str:
+    attack, frames = strongest(summary), summary['frames']
+    clean = (f'Without an attack the detector declared {summary["clean"]["loops_declared"]} loops '
+             f'in {frames} frames of {summary["sequence"]}')
+    unknown = 'Without ground truth nobody can say which of them are right'
+    if attack is None:
+        return f'{clean}. {unknown}.'
+    return (f'{clean}. The strongest attack, {attack_title(attack)}, changed '
+            f'{attack["changed"]} decisions ({percent(attack["success_rate"])} of the frames that '
+            f'could be attacked): {attack["silenced"]} loops silenced, {attack["raised"]} raised, '
+            f'{attack["redirected"]} declared with another frame, with '
+            f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
+            f'flipped in a graph on average. {unknown}.')
+
+
 def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
     found = summary['clean']['tp']
     silent = summary['clean']['tn']
@@ -116,7 +144,9 @@ def _sentence(text: str) -> str:
 
 
 def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return the decline table, one row an attack: heading to cell."""
+    """Return the table of what attacks took or changed, one row an attack: heading to cell."""
+    if not is_labelled(summary):
+        return _change_rows(summary)
     clean = summary['clean']
     return [{
         'attack': attack_title(attack),
@@ -135,6 +165,8 @@ def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Return the figures of the detector, one row a run: heading to cell."""
+    if not is_labelled(summary):
+        return _declared_rows(summary)
     runs = [('before', summary['clean'])]
     runs += [(attack_title(attack), attack) for attack in summary['attacks']]
     return [{
@@ -148,4 +180,29 @@ def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         'average precision': number(run['average_precision'], 3),
         'MCC': number(run['mcc'], 3),
         'wrong matches': str(run['wrong_matches']),
+    } for title, run in runs]
+
+
+def _change_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    return [{
+        'attack': attack_title(attack),
+        'ratio r': f'{attack["ratio"]:g}',
+        'edits': mean_count(attack['edits_mean']),
+        'queries': mean_count(attack['queries_mean']),
+        'changed': f'{attack["changed"]} of {summary["frames"]}',
+        'success rate': percent(attack['success_rate']),
+        'silenced': str(attack['silenced']),
+        'raised': str(attack['raised']),
+        'other match': str(attack['redirected']),
+        'unattackable': f'{attack["unattackable"]} of {summary["frames"]}',
+    } for attack in summary['attacks']]
+
+
+def _declared_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    runs = [('before', {**summary['clean'], 'agreement': 1.0})]
+    runs += [(attack_title(attack), attack) for attack in summary['attacks']]
+    return [{
+        'run': title,
+        'loops declared': f'{run["loops_declared"]} of {summary["frames"]}',
+        'decisions as in the clean run': percent(run['agreement']),
     } for title, run in runs]

@@ -90,6 +90,7 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
     values = {
         'summary': summary, 'strongest': wording.strongest(summary), 'wording': wording,
         'headline': wording.headline(summary),
+        'labelled': wording.is_labelled(summary),
         'decline_rows': wording.decline_rows(summary),
         'figure_rows': wording.figure_rows(summary),
         'curve': None if curve is None else data_uri(curve, 'svg+xml'),
@@ -117,6 +118,8 @@ def _threshold(configuration: Mapping[str, Any]) -> float:
 
 
 def _sample(summary: Mapping[str, Any]) -> list[tuple[str, int, float]]:
+    if not wording.is_labelled(summary):
+        return []
     counts = {'positive': summary['positives'], 'negative': summary['negatives'],
               **summary['not_scored']}
     return [(text, counts[kind], counts[kind] / summary['frames'])

@@ -35,6 +35,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 from adversarial_lcd_ros.evaluation.replay.report import write_report
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.evaluation.results import RECORDS, SUMMARY, ResultsFolder
+from adversarial_lcd_ros.evaluation.wording import strongest
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
 from adversarial_lcd_ros.graph_sequences.opening import (
@@ -42,7 +43,7 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     holds_graphs,
     open_graphs,
 )
-from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames, unlabelled
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
@@ -96,9 +97,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     Parameters
     ----------
     bag : Path
-        Bag with images and ground truth, as "adversarial-lcd import" writes it; or with graphs
-        and ground truth, as "adversarial-lcd build" does: these are used as they are, whatever
-        the settings of the builder.
+        Bag with images, as "adversarial-lcd import" writes it; or with graphs, as
+        "adversarial-lcd build" does: these are used as they are, whatever the settings of the
+        builder. Without ground truth no decision is scored, and what changes is counted.
     output : Path
         Folder in which the results folder is made.
     plan : Plan
@@ -112,7 +113,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     Raises
     ------
     EvaluationError
-        The bag has no ground truth, a node failed, or messages were lost.
+        A node failed, or messages were lost.
 
     """
     started_s = time.monotonic()
@@ -120,8 +121,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         plan = _without_builder(bag, plan, tell)
     sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
     if sequence.trajectory is None:
-        raise EvaluationError(f'{bag} has no ground truth: without it nobody can tell what is a '
-                              'loop; import it again with --ground-truth')
+        if plan.sweep_labels:
+            raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
+        tell('no ground truth: decisions that change are counted, none can be scored')
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
     frames = Replay(bag, plan.replay).frame_count
     target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
@@ -129,8 +131,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     runs = _replay(bag, sequence, plan, frames, folder.path / RECORDINGS, tell)
     tell('labels, figures and pictures')
     clean = runs.pop(CLEAN)
-    labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in clean.clean],
-                          sequence.image_size, plan.labels)
+    labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
@@ -138,7 +139,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         plan.seed)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
-    if plan.sweep_labels:
+    if plan.sweep_labels and sequence.trajectory:
         tell('labels with other thresholds')
         summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
                                               plan.labels)
@@ -149,6 +150,14 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     if not keep_recordings:
         shutil.rmtree(folder.path / RECORDINGS)
     return folder.finish(), summary
+
+
+def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
+            plan: Plan) -> FrameLabels:
+    stamps = [graph.stamp_ns for graph in clean.clean]
+    if sequence.trajectory is None:
+        return unlabelled(stamps)
+    return label_frames(sequence.trajectory, stamps, sequence.image_size, plan.labels)
 
 
 def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
@@ -230,9 +239,10 @@ def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
     """Return query, match and attacked graph of telling frames of the strongest attack."""
     if not runs:
         return []
-    strongest = max(summary['attacks'], key=lambda attack: attack['decline_pp'] or 0.0)['name']
+    attack = strongest(summary)
+    name = str(attack['name']) if attack else CLEAN
     by_run = runs_of(records)
-    chosen = choose_records(by_run[strongest], PICTURES)
+    chosen = choose_records(by_run[name], PICTURES)
     wanted = {record.stamp_ns for record in chosen} | {
         clean.clean[record.match_frame].stamp_ns for record in chosen
         if record.match_frame is not None}
@@ -242,8 +252,8 @@ def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
         title, caption = describe(record, by_run[CLEAN][record.frame])
         match = clean.clean[record.match_frame if record.match_frame is not None
                             else record.frame]
-        run = runs[strongest]
-        pictures.append(Picture(f'{title} ({strongest})', caption, np.asarray(draw_attack(
+        run = runs[name]
+        pictures.append(Picture(f'{title} ({name})', caption, np.asarray(draw_attack(
             image[record.stamp_ns], run.clean[record.frame], image[match.stamp_ns], match,
             run.forwarded[record.frame]), np.uint8)))
     return pictures

@@ -21,10 +21,20 @@ from adversarial_lcd_ros.evaluation.metrics import (
     measure,
     right,
 )
-from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    NO_TRUTH,
+    QueryRecord,
+    column,
+    decision_change,
+    runs_of,
+)
 from adversarial_lcd_ros.evaluation.results import summary_document
 
 KIND, SCHEMA = 'replay', 2
+# What nobody can count without ground truth.
+_NEED_LABELS = ('positives', 'negatives', 'tp', 'fn', 'fp', 'tn', 'wrong_matches', 'suppressed',
+                'diverted', 'invented', 'regained', 'withdrawn', 'wrong_closures_unscored')
 
 
 @dataclass(frozen=True)
@@ -80,9 +90,9 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
                               'repeated messages and gives no figure: run it again')
     block = intervals.block_frames(column(clean, 'stamp_ns'), block_s)
     kinds = Counter(record.kind for record in clean)
-    return {
-        'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
-        'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
+    summary = {
+        'sequence': sequence, 'labelled': kinds[NO_TRUTH] < len(clean), 'frames': len(clean),
+        'graphs': graphs.count, 'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
         'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
         'negatives': kinds['negative'],
         'not_scored': {name: kinds[name] for name in FRAME_KINDS[2:]},
@@ -92,6 +102,16 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
         'seed': seed,
         'bootstrap': {'block_s': block_s, 'block_frames': block, 'blocks': len(clean) / block,
                       'replicates': intervals.REPLICATES, 'level': intervals.LEVEL}}
+    return summary if summary['labelled'] else _without_labels(summary)
+
+
+def _without_labels(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the summary with None for all that ground truth would be needed for."""
+    def unknown(figures: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: None if name in _NEED_LABELS else value for name, value in figures.items()}
+
+    return {**unknown(summary), 'clean': unknown(summary['clean']),
+            'attacks': [unknown(attack) for attack in summary['attacks']]}
 
 
 def as_document(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -132,6 +152,7 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
     kind, outcome = column(run, 'label'), column(run, 'outcome')
     return {
         **run_metrics(run).as_dict(),
+        'loops_declared': sum(record.is_loop for record in run),
         'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
             kind, right(outcome), block, seed),
         # Outside the scored frames a closure with another place is still wrong.
@@ -151,9 +172,22 @@ def _attack_figures(name: str, config: AttackConfig, clean: Sequence[QueryRecord
         'name': name, **attack_columns(config),
         'ratio': config.ratio, 'mode': config.mode, 'edit_kinds': config.edits,
         'seed': config.seed, 'decisions': len(run), **_effort(run),
-        **_run_figures(run, block, seed), **change,
+        **_run_figures(run, block, seed), **change, **_changes(clean, run),
         'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
                                                     seed)}
+
+
+def _changes(clean: Sequence[QueryRecord], run: Sequence[QueryRecord]) -> dict[str, Any]:
+    """Count the decisions that changed, whatever is right."""
+    found = Counter(map(decision_change, clean, run))
+    changed = len(run) - found['']
+    attacked = sum(not _unattackable(record) for record in run)
+    return {
+        'silenced': found['silenced'], 'raised': found['raised'],
+        'redirected': found['redirected'], 'changed': changed,
+        # Of the frames that could be attacked; the others cannot be won.
+        'success_rate': changed / attacked if attacked else None,
+        'agreement': found[''] / len(run)}
 
 
 def _effort(run: Sequence[QueryRecord]) -> dict[str, Any]:
