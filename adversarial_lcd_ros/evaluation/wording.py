@@ -125,8 +125,8 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
         return f'{clean}. {unknown}.'
     return (f'{clean}. The strongest attack, {attack_title(attack)}, changed '
             f'{attack["changed"]} decisions ({percent(attack["success_rate"])} of the frames that '
-            f'could be attacked): {attack["silenced"]} loops silenced, {attack["raised"]} raised, '
-            f'{attack["redirected"]} declared with another frame, with '
+            f'could be attacked): loops silenced {attack["silenced"]}, raised {attack["raised"]}, '
+            f'declared with another frame {attack["redirected"]}, with '
             f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
             f'flipped in a graph on average. {unknown}.')
 

@@ -15,7 +15,7 @@ HEADER, LOG = 'header', 'log'
 STAMPS = (HEADER, LOG)
 # What a clock that is set gains on the log times; frames that were left out do not.
 _JUMP_NS = 300_000_000_000
-REMEDY = f'take the log times of the bag, "--stamps {LOG}"'
+REMEDY = f'import it with the log times of the bag, "--stamps {LOG}"'
 
 
 def frame_stamps(header_ns: Sequence[int], log_ns: Sequence[int], source: Path,

@@ -13,14 +13,21 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
 from adversarial_lcd_ros.evaluation.replay import plots
-from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, read_records, runs_of
-from adversarial_lcd_ros.evaluation.replay.summary import from_document
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    QueryRecord,
+    read_records,
+    runs_of,
+    write_records,
+)
+from adversarial_lcd_ros.evaluation.replay.summary import as_document, from_document
 from adversarial_lcd_ros.evaluation.results import (
     CONFIGURATION,
     ENVIRONMENT,
     RECORDS,
     REPORT,
     SUMMARY,
+    ResultsFolder,
     read_json,
 )
 from adversarial_lcd_ros.files import write_text
@@ -59,6 +66,14 @@ def write_report(folder: Path, summary: Mapping[str, Any], records: Sequence[Que
     """
     write_pictures(folder, pictures)
     return _render(folder, summary, records)
+
+
+def write_results(folder: ResultsFolder, summary: Mapping[str, Any],
+                  records: Sequence[QueryRecord], pictures: Sequence[Picture]) -> None:
+    """Write summary, records, pictures and report of an evaluation whose setup is written."""
+    folder.write_json(SUMMARY, as_document(summary))
+    write_records(folder.path / RECORDS, records)
+    write_report(folder.path, summary, records, pictures)
 
 
 def report_folder(folder: Path) -> Path:

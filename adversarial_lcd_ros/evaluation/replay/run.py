@@ -9,9 +9,6 @@ import shutil
 import time
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -22,20 +19,17 @@ from adversarial_lcd_ros.config import (
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
-from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.processes import Recording, Setup, run_pipeline
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     AttackRun,
     QueryRecord,
     make_records,
-    runs_of,
-    write_records,
 )
-from adversarial_lcd_ros.evaluation.replay.report import write_report
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
-from adversarial_lcd_ros.evaluation.results import RECORDS, SUMMARY, ResultsFolder
-from adversarial_lcd_ros.evaluation.wording import strongest
+from adversarial_lcd_ros.evaluation.replay.report import write_results
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
+from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
 from adversarial_lcd_ros.graph_sequences.opening import (
@@ -49,11 +43,8 @@ from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.replay import Replay
-from adversarial_lcd_ros.vision.draw import draw_attack
 
 RECORDINGS = 'recordings'
-PICTURES = 6
-BLANK_GREY = 64
 
 
 @dataclass(frozen=True)
@@ -146,7 +137,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         write_sweep(folder.path / SWEEP, summary['label_sweep'])
     summary['duration_s'] = time.monotonic() - started_s
     _write(folder, plan, summary, records, command_line,
-           _pictures(sequence, clean, runs, records, summary))
+           telling_pictures(sequence, clean, runs, records, summary))
     if not keep_recordings:
         shutil.rmtree(folder.path / RECORDINGS)
     return folder.finish(), summary
@@ -218,42 +209,4 @@ def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
            pictures: Sequence[Picture]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed)
-    folder.write_json(SUMMARY, as_document(summary))
-    write_records(folder.path / RECORDS, records)
-    write_report(folder.path, summary, records, pictures)
-
-
-def _images(sequence: CameraSequence | GraphSequence,
-            wanted: set[int]) -> dict[int, NDArray[np.uint8]]:
-    """Return the frames with these stamps; blank ones where there are only graphs."""
-    if isinstance(sequence, GraphSequence):
-        width, height = sequence.image_size
-        return dict.fromkeys(wanted, np.full((height, width, 3), BLANK_GREY, np.uint8))
-    return {frame.stamp_ns: frame.image() for frame in sequence.frames()
-            if frame.stamp_ns in wanted}
-
-
-def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
-              runs: Mapping[str, Recording], records: Sequence[QueryRecord],
-              summary: Mapping[str, Any]) -> list[Picture]:
-    """Return query, match and attacked graph of telling frames of the strongest attack."""
-    if not runs:
-        return []
-    attack = strongest(summary)
-    name = str(attack['name']) if attack else CLEAN
-    by_run = runs_of(records)
-    chosen = choose_records(by_run[name], PICTURES)
-    wanted = {record.stamp_ns for record in chosen} | {
-        clean.clean[record.match_frame].stamp_ns for record in chosen
-        if record.match_frame is not None}
-    image = _images(sequence, wanted)
-    pictures = []
-    for record in chosen:
-        title, caption = describe(record, by_run[CLEAN][record.frame])
-        match = clean.clean[record.match_frame if record.match_frame is not None
-                            else record.frame]
-        run = runs[name]
-        pictures.append(Picture(f'{title} ({name})', caption, np.asarray(draw_attack(
-            image[record.stamp_ns], run.clean[record.frame], image[match.stamp_ns], match,
-            run.forwarded[record.frame]), np.uint8)))
-    return pictures
+    write_results(folder, summary, records, pictures)
