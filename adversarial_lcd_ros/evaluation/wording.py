@@ -58,6 +58,10 @@ def mean_count(value: float | None) -> str:
     return number(value, 1 if value is None or value < 100 else 0)
 
 
+def _ratio(value: float | None) -> str:
+    return UNDEFINED if value is None else f'{value:g}'
+
+
 def points(value: float | None) -> str:
     """Return percentage points; what rounds to nothing has no sign."""
     return UNDEFINED if value is None else f'{round(value, 1) + 0.0:.1f}'
@@ -113,7 +117,7 @@ def headline(summary: Mapping[str, Any]) -> str:
     return (f'The attack took {points(attack["decline_pp"])} points off the balanced accuracy of '
             f'loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
             f'{percent(attack["balanced_accuracy"])} (95{_NARROW_SPACE}% interval of the decline '
-            f'{interval(bounds)}), with {effort}. {_sentence(_changes(summary, attack))}.')
+            f'{interval(bounds)}), with {effort}. {sentence(_changes(summary, attack))}.')
 
 
 def _headline_without_labels(summary: Mapping[str, Any]) -> str:
@@ -139,7 +143,8 @@ def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
             'left alone')
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
@@ -150,7 +155,7 @@ def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     clean = summary['clean']
     return [{
         'attack': attack_title(attack),
-        'ratio r': f'{attack["ratio"]:g}',
+        'ratio r': _ratio(attack['ratio']),
         'edits': mean_count(attack['edits_mean']),
         'queries': mean_count(attack['queries_mean']),
         'balanced accuracy': (f'{percent(clean["balanced_accuracy"])} → '
@@ -186,7 +191,7 @@ def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
 def _change_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     return [{
         'attack': attack_title(attack),
-        'ratio r': f'{attack["ratio"]:g}',
+        'ratio r': _ratio(attack['ratio']),
         'edits': mean_count(attack['edits_mean']),
         'queries': mean_count(attack['queries_mean']),
         'changed': f'{attack["changed"]} of {summary["frames"]}',
