@@ -213,7 +213,7 @@ def test_wrong_stamps_of_frames_are_named_and_log_times_help(tmp_path, frames_ns
     with pytest.raises(SequenceError, match=f'{said}.*--stamps log'):
         open_sequence(source)
     done = import_sequence(source, tmp_path / 'out', stamps='log')
-    assert (done.posed_frames, done.path_m) == (4, 3.0)
+    assert (done.coverage.posed_frames, done.coverage.path_m) == (4, 3.0)
     again = open_sequence(tmp_path / 'out')
     assert again.stamps_ns.tolist() == stamps(COUNT)
     assert [frame.stamp_ns for frame in again.frames()] == stamps(COUNT)
@@ -284,7 +284,7 @@ def test_a_rate_does_not_stretch_numbered_poses(tmp_path):
     found = open_sequence(folder, ground_truth=tmp_path / 'truth.txt', rate_hz=10.0)
     assert found.stamps_ns.tolist() == [k * 100_000_000 for k in range(6)]
     assert found.trajectory.stamp_ns.tolist() == found.stamps_ns.tolist()
-    assert open_sequence(folder, ground_truth=tmp_path / 'truth.txt').posed.all()
+    assert open_sequence(folder, ground_truth=tmp_path / 'truth.txt').coverage.posed_frames == 6
 
 
 def test_seconds_at_one_hertz_stay_seconds(tmp_path):
@@ -317,6 +317,6 @@ def test_an_import_ends_with_what_has_a_pose(tmp_path):
         make.pose_line(stamp, 2.0 * k) for k, stamp in enumerate(stamps(3))))
     folder = make.tum_folder(tmp_path / 'tum', count=30)
     done = import_sequence(folder, tmp_path / 'bag', ground_truth=tmp_path / 'truth.txt')
-    assert done.coverage().startswith('4 of 30 frames have a pose, over 0.1 s and a path of 4.00')
+    assert str(done.coverage).startswith('4 of 30 frames have a pose, over 0.1 s and a path of 4.00')
     bare = import_sequence(make.tum_folder(tmp_path / 'bare', truth=False), tmp_path / 'other')
-    assert bare.coverage() == 'no ground truth: the source has none'
+    assert str(bare.coverage) == 'no ground truth: the source has none'

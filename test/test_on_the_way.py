@@ -1,16 +1,20 @@
 """Recordings that were not imported: imported on the way, once, and kept by their content."""
 
+import json
 import shutil
 
 import bag_factory as make
+import cv2
 import pytest
 
 from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import import_sequence, open_sequence
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
 from adversarial_lcd_ros.sequences.on_the_way import imported, is_imported
+from adversarial_lcd_ros.sequences.replay import Replay
 
 
 @pytest.fixture(autouse=True)
@@ -100,3 +104,66 @@ def test_a_part_cannot_be_replayed(tmp_path, capsys):
     folder = make.tum_folder(tmp_path / 'tum')
     assert main(['evaluate', f'{folder}@0:0.5', '--output', str(tmp_path / 'results')]) == 2
     assert '--replay-duration-s' in capsys.readouterr().err
+
+
+def test_inspect_tells_of_any_recording(tmp_path, capsys):
+    folder = make.tum_folder(tmp_path / 'tum')
+    assert main(['inspect', str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert 'frames: 4 of 64 x 48 pixels' in said
+    assert '4 of 4 frames have a pose, over 0.1 s and a path of 3.00 m' in said
+    goal = make.write_ros2(tmp_path / 'goal', make.jpeg_rows() + make.pose_rows(
+        topic='/goal_pose'))
+    assert main(['inspect', str(goal)]) == 0
+    assert '/goal_pose (PoseStamped) is by its name' in capsys.readouterr().out
+    two = make.write_ros2(tmp_path / 'two', make.jpeg_rows() + make.pose_rows(
+        topic='/a') + make.pose_rows(topic='/b'))
+    assert main(['inspect', str(two)]) == 0
+    assert 'import: bag' in capsys.readouterr().out
+    assert main(['inspect', str(two), '--ground-truth', '/b']) == 0
+    assert 'ground truth: /b (PoseStamped)' in capsys.readouterr().out
+
+
+def test_a_replay_refuses_a_clock_that_jumps(tmp_path):
+    rows = make.jpeg_rows()
+    early = [(*rows[0][:3], make.ROS2.compressed(5_000_000_000, make.encoded(make.picture()))),
+             *rows[1:]]
+    with pytest.raises(SequenceError, match=r'clock of the headers jumps.*--stamps log'):
+        Replay(make.write_ros2(tmp_path / 'bag', early), ReplayConfig())
+
+
+def robot_bag(path, count):
+    """Write a robot's bag: raw images, camera_info, odometry, /tf and /tf_static."""
+    times = make.stamps(count)
+    optical = ('base_link', 'camera_optical', (0.1, 0.0, 0.4), (-0.5, 0.5, -0.5, 0.5))
+    rows = [('/tf_static', make.TF, times[0], make.ROS2.tf(make.ROS2.link(0, *optical)))]
+    for k, stamp in enumerate(times):
+        place = (0.05 * k, 0.0, 0.0)
+        rows += [
+            ('/camera/image_raw', make.IMAGE, stamp, make.ROS2.image(
+                stamp, cv2.cvtColor(make.noise(k), cv2.COLOR_GRAY2BGR),
+                frame_id='camera_optical')),
+            ('/camera/camera_info', make.CAMERA_INFO, stamp,
+             make.ROS2.camera_info(stamp, 'camera_optical')),
+            ('/odom', make.ODOMETRY, stamp, make.ROS2.odometry(stamp, place)),
+            ('/tf', make.TF, stamp, make.ROS2.tf(
+                make.ROS2.link(stamp, 'odom', 'base_link', place)))]
+    return make.write_ros2(path, rows)
+
+
+def test_a_robots_bag_goes_from_file_to_report_by_one_command(tmp_path, capsys):
+    pytest.importorskip('rclpy')
+    recipe = tmp_path / 'one.yaml'
+    recipe.write_text('attacks: [{name: recall, perturbation: recall, max_queries: 2}]')
+    line = ['evaluate', str(robot_bag(tmp_path / 'robot', 8)), '--output',
+            str(tmp_path / 'results'), '--builder-detector', 'none', '--recipe', str(recipe)]
+    assert main(line) == 0
+    said = capsys.readouterr().err
+    assert '8 of 8 frames have a pose, over 0.2 s and a path of 0.35 m' in said
+    assert 'odom > base_link > camera_optical' in said
+    latest = tmp_path / 'results' / 'latest'
+    summary = json.loads((latest / 'summary.json').read_text())
+    assert (summary['sequence'], summary['frames'], summary['labelled']) == ('robot', 8, True)
+    assert (latest / 'report.html').stat().st_size
+    assert main([*line, '--ground-truth', 'none']) == 0
+    assert not json.loads((latest / 'summary.json').read_text())['labelled']

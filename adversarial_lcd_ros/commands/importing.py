@@ -36,4 +36,4 @@ def _import(options: Namespace) -> None:
     width, height = done.image_size
     print(f'{done.path}: {done.frames} frames of {width} x {height} pixels, {done.poses} poses, '
           f'{done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
-    print(done.coverage())
+    print(done.coverage)

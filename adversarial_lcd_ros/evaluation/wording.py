@@ -127,7 +127,8 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
     unknown = 'Without ground truth nobody can say which of them are right'
     if attack is None:
         return f'{clean}. {unknown}.'
-    return (f'{clean}. The strongest attack, {attack_title(attack)}, changed '
+    which = 'strongest attack' if len(summary['attacks']) > 1 else 'attack'
+    return (f'{clean}. The {which}, {attack_title(attack)}, changed '
             f'{attack["changed"]} decisions ({percent(attack["success_rate"])} of the frames that '
             f'could be attacked): loops silenced {attack["silenced"]}, raised {attack["raised"]}, '
             f'declared with another frame {attack["redirected"]}, with '

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import heapq
-import math
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWri
 from adversarial_lcd_ros.sequences.cdr import header
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
-from adversarial_lcd_ros.sequences.sequence import Sequence
+from adversarial_lcd_ros.sequences.sequence import Coverage, Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
@@ -31,18 +30,7 @@ _TERMS = ('credits', 'license', 'licence')
 
 @dataclass(frozen=True)
 class ImportSummary:
-    """
-    What an import has written.
-
-    Attributes
-    ----------
-    truth : str
-        Where the ground truth is from, or why there is none.
-    posed_frames, posed_s, path_m
-        Frames with a pose near them, the time from the first to the last of them, seconds, and
-        the length of the path between, metres; NaN for places by index.
-
-    """
+    """What an import has written."""
 
     path: Path
     name: str
@@ -51,19 +39,7 @@ class ImportSummary:
     image_size: tuple[int, int]
     duration_s: float
     size_bytes: int
-    truth: str
-    posed_frames: int
-    posed_s: float
-    path_m: float
-
-    def coverage(self) -> str:
-        """Return in words how many frames have a pose, or why none has."""
-        if not self.posed_frames:
-            return f'no ground truth: {self.truth or "the source has none"}'
-        path = 'places by index' if math.isnan(self.path_m) else f'a path of {self.path_m:.2f} m'
-        return (f'{self.posed_frames} of {self.frames} frames have a pose, over '
-                f'{self.posed_s:.1f} s and {path}'
-                + (f'; ground truth: {self.truth}' if self.truth else ''))
+    coverage: Coverage
 
 
 def import_sequence(source: Path | str, destination: Path | str, *,
@@ -120,14 +96,10 @@ def import_sequence(source: Path | str, destination: Path | str, *,
 
 def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
     stamps = sequence.stamps_ns
-    posed = stamps[sequence.posed]
-    path_m = (0.0 if sequence.trajectory is None or not len(posed)
-              else sequence.trajectory.at(posed).length_m)
     return ImportSummary(
         path, sequence.name, sequence.frame_count, poses, sequence.image_size,
         float(stamps[-1] - stamps[0]) / 1e9, sum(file.stat().st_size for file in path.iterdir()),
-        sequence.truth, len(posed), float(posed[-1] - posed[0]) / 1e9 if len(posed) else 0.0,
-        path_m)
+        sequence.coverage)
 
 
 def _terms(source: Path) -> list[Path]:

@@ -93,7 +93,7 @@ def imported(source: Path, options: Mapping[str, Any], *,
         if bag.parent.is_dir() and not any(bag.parent.iterdir()):
             bag.parent.rmdir()
         raise
-    tell(f'{done.frames} frames; {done.coverage()}')
+    tell(f'{done.frames} frames; {done.coverage}')
     return bag
 
 

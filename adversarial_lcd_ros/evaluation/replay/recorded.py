@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+import math
 from pathlib import Path
 import time
 from typing import Any, TypeVar
@@ -231,6 +232,7 @@ def _sequence(bag: Path, run: Recording, source: dict[str, Any],
 def _agreement(run: Recording, lcd: LcdConfig) -> str:
     again = run_offline(run.forwarded, lcd)[0].decisions
     same = sum(now.is_loop == then.is_loop and now.match_stamp_ns == then.match_stamp_ns
+               and math.isclose(now.probability, then.probability, abs_tol=1e-6)
                for now, then in zip(again, run.decisions, strict=True))
     text = (f'with the settings given, the detector repeats {same} of {len(again)} recorded '
             'decisions on the graphs that it got')
