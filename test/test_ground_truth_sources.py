@@ -287,6 +287,27 @@ def test_a_rate_does_not_stretch_numbered_poses(tmp_path):
     assert open_sequence(folder, ground_truth=tmp_path / 'truth.txt').coverage.posed_frames == 6
 
 
+def test_poses_at_whole_seconds_of_a_simulated_clock_stay_seconds(tmp_path):
+    folder = make.tum_folder(tmp_path / 'tum', count=41) / 'rgb'
+    (tmp_path / 'truth.txt').write_text(lines(range(5)))
+    found = open_sequence(folder, ground_truth=tmp_path / 'truth.txt', rate_hz=10.0)
+    assert found.trajectory.stamp_ns.tolist() == [k * 10**9 for k in range(5)]
+    assert found.coverage.posed_frames == 5
+
+
+def test_poses_on_a_topic_may_be_numbered_as_well(tmp_path):
+    source = make.write_ros2(tmp_path / 'bag', restamped(
+        stamps(COUNT), [k * 10**9 for k in range(COUNT)]))
+    assert open_sequence(source).trajectory.stamp_ns.tolist() == stamps(COUNT)
+
+
+def test_an_empty_path_is_no_trajectory(tmp_path):
+    source = bag(tmp_path, [('/path', make.PATH, make.START_NS, ROS2.path([]))])
+    assert open_sequence(source).trajectory is None
+    with pytest.raises(SequenceError, match='there is no pose'):
+        open_sequence(source, ground_truth='/path')
+
+
 def test_seconds_at_one_hertz_stay_seconds(tmp_path):
     folder = make.tum_folder(tmp_path / 'tum', count=3) / 'rgb'
     (tmp_path / 'truth.txt').write_text(lines(range(3)))
@@ -317,6 +338,7 @@ def test_an_import_ends_with_what_has_a_pose(tmp_path):
         make.pose_line(stamp, 2.0 * k) for k, stamp in enumerate(stamps(3))))
     folder = make.tum_folder(tmp_path / 'tum', count=30)
     done = import_sequence(folder, tmp_path / 'bag', ground_truth=tmp_path / 'truth.txt')
-    assert str(done.coverage).startswith('4 of 30 frames have a pose, over 0.1 s and a path of 4.00')
+    assert str(done.coverage).startswith(
+        '4 of 30 frames have a pose, over 0.1 s and a path of 4.00 m')
     bare = import_sequence(make.tum_folder(tmp_path / 'bare', truth=False), tmp_path / 'other')
     assert str(bare.coverage) == 'no ground truth: the source has none'

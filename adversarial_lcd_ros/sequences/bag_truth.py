@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-import re
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.bagfile import OLD_TF, POSE, TF, BagFile
-from adversarial_lcd_ros.sequences.frame_poses import read_poses
+from adversarial_lcd_ros.sequences.bagfile import OLD_TF, TF, BagFile
+from adversarial_lcd_ros.sequences.frame_poses import by_number, read_poses
 from adversarial_lcd_ros.sequences.pose_files import mounted
-from adversarial_lcd_ros.sequences.stamps import LOG, REMEDY
+from adversarial_lcd_ros.sequences.pose_topics import (
+    ODOMETRY,
+    POSE_TYPES,
+    ends_of,
+    reason_against,
+    topic_poses,
+)
+from adversarial_lcd_ros.sequences.stamps import LOG
 from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX, Trajectory
 from adversarial_lcd_ros.sequences.transforms import (
     FrameTree,
@@ -28,15 +32,7 @@ from adversarial_lcd_ros.sequences.transforms import (
 
 TRUTH_TOPIC, TRUTH_FILE = '/ground_truth', 'groundtruth.txt'
 NO_TRUTH = 'none'
-POSE_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
-ODOMETRY, PATH = 'nav_msgs/msg/Odometry', 'nav_msgs/msg/Path'
-TRANSFORM = 'geometry_msgs/msg/TransformStamped'
 CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
-POSE_TYPES = (POSE, POSE_COVARIANCE, ODOMETRY, TRANSFORM, PATH)
-# Where a robot is sent, or told that it is, is not where it was.
-_WISHES = {'goal', 'goals', 'initialpose', 'target', 'setpoint', 'waypoint', 'waypoints', 'plan',
-           'planned', 'plans', 'command', 'cmd'}
-_FEWEST = 2
 _TF_TOPIC = '/tf'
 
 
@@ -111,7 +107,7 @@ class BagTruth:
         infos = [name for name in self._bag.of_type(CAMERA_INFO)
                  if topic.startswith(name.rsplit('/', 1)[0] + '/')]
         for name in sorted(infos, key=len, reverse=True):
-            frame = self._ends(name)[0]
+            frame = ends_of(self._bag, name)[0]
             if frame in self._tree:
                 return frame
         return chosen
@@ -168,7 +164,7 @@ class BagTruth:
     def _only(self) -> Truth:
         """Return the only source there is, or say why there is none."""
         refused = {topic: reason for topic in self._bag.of_type(*POSE_TYPES)
-                   if (reason := self._reason_against(topic))}
+                   if (reason := reason_against(self._bag, topic))}
         topics = [topic for topic in self._bag.of_type(*POSE_TYPES) if topic not in refused]
         chains = self._tf_chains()
         found = [f'{topic} ({self._kind(topic)})' for topic in topics]
@@ -201,42 +197,19 @@ class BagTruth:
         return (f'{"; ".join(reasons) or "the bag has no poses"}; give a topic or a file with '
                 '--ground-truth')
 
-    def _reason_against(self, topic: str) -> str:
-        words = set(re.split(r'[/_\-]', topic.lower()))
-        if words & _WISHES:
-            return 'by its name where a robot was to be, not where it was'
-        if self._bag.topics[topic] == PATH:
-            return '' if self._is_past(topic) else 'a path to go: its poses have no times'
-        count = self._bag.counts[topic]
-        return f'{count} pose, no trajectory' if count < _FEWEST else ''
-
-    def _is_past(self, topic: str) -> bool:
-        stamps = [_stamp_ns(pose.header) for pose in self._last(topic).poses]
-        return len(stamps) >= _FEWEST and bool((np.diff(stamps) > 0).all())
-
-    def _last(self, topic: str) -> Any:
-        *_, (_, _, wire) = self._bag.messages([topic])
-        return self._bag.decode(topic, wire)
-
     def _is_odometry(self, topics: list[str], chains: list[list[Link]]) -> bool:
         """Tell whether the one motion in /tf is what the one topic says, too."""
         if len(topics) != 1 or len(chains) != 1:
             return False
-        parent, child = self._ends(topics[0])
+        parent, child = ends_of(self._bag, topics[0])
         moving = [(link.parent, link.child) for link in chains[0] if link.moves]
         return bool(child) and (parent, child) in moving and len(moving) == 1
 
     # poses on a topic ----------------------------------------------------------------------
 
-    def _ends(self, topic: str) -> tuple[str, str]:
-        """Return the frame of the poses and the frame whose poses they are, '' if not said."""
-        message = self._bag.decode(topic, next(iter(self._bag.messages([topic])))[2])
-        return (message.header.frame_id.strip('/'),
-                str(getattr(message, 'child_frame_id', '')).strip('/'))
-
     def _mount(self, topic: str) -> list[Link] | str:
         """Return the links from the frame of a topic's poses to the camera, or what is missing."""
-        body = self._ends(topic)[1] or self._options.body_frame
+        body = ends_of(self._bag, topic)[1] or self._options.body_frame
         if not body or self._options.extrinsics is not None:
             return []
         chain = self._tree.chain(body.strip('/'), self._camera)
@@ -250,12 +223,13 @@ class BagTruth:
 
     def _topic(self, topic: str) -> Truth:
         try:
-            parent, poses, repeated = self._poses(topic)
+            poses, repeated = topic_poses(self._bag, topic, self._by_log)
+            poses, parent = by_number(poses, self._frames_ns, topic), poses.frame_id
             mount = [] if parent == PLACE_INDEX else self._mount(topic)
             if isinstance(mount, str):
                 raise SequenceError(mount)
-            chain = [*self._above(parent), Link(parent, self._ends(topic)[1] or 'camera', poses,
-                                                moves=True), *mount]
+            body = Link(parent, ends_of(self._bag, topic)[1] or 'camera', poses, moves=True)
+            chain = [*self._above(parent), body, *mount]
             trajectory = compose(chain) if len(chain) > 1 else poses
         except SequenceError as error:
             where = '' if topic in str(error) else f', {topic}'
@@ -276,44 +250,6 @@ class BagTruth:
             raise SequenceError(f'/tf has no single chain from the fixed frame {fixed!r} to '
                                 f'{parent!r}; it has {self._tree.text() or "no frames"}')
         return chain
-
-    def _poses(self, topic: str) -> tuple[str, Trajectory, int]:
-        """Return the frame of the poses on a topic, the poses, and how many stamps repeated."""
-        rows = list(self._rows(topic))
-        frames = sorted({frame for frame, *_ in rows})
-        if len(frames) != 1:
-            raise SequenceError(f'the poses are in several frames: {", ".join(frames)}')
-        stamps = np.array([stamp for _, stamp, _ in rows], np.int64)
-        poses = np.array([pose for _, _, pose in rows], np.float64)
-        if len(stamps) > 1 and not stamps.any():
-            raise SequenceError(f'all {len(stamps)} poses are stamped 0: {REMEDY}')
-        # Motion capture repeats a stamp now and then: the first pose is kept, as from a file.
-        kept = np.r_[True, np.diff(stamps) != 0]
-        parent = frames[0].strip('/').split(' > ')[0]
-        try:
-            trajectory = Trajectory(stamps[kept], poses[kept, :3], poses[kept, 3:], parent)
-        except SequenceError as error:
-            back = bool((np.diff(stamps) < 0).any()) and not self._by_log
-            raise SequenceError(f'{error}{": " + REMEDY if back else ""}') from None
-        return parent, trajectory, int((~kept).sum())
-
-    def _rows(self, topic: str) -> Iterator[tuple[str, int, tuple[float, ...]]]:
-        """Yield the frames, the stamp, and position and quaternion of every pose."""
-        if self._bag.topics[topic] == PATH:
-            for pose in self._last(topic).poses:
-                frame = pose.header.frame_id or self._ends(topic)[0]
-                yield frame, _stamp_ns(pose.header), _pose(pose.pose)
-            return
-        for _, log_ns, wire in self._bag.messages([topic]):
-            message = self._bag.decode(topic, wire)
-            child = str(getattr(message, 'child_frame_id', ''))
-            frame = message.header.frame_id + (f' > {child}' if child else '')
-            stamp_ns = log_ns if self._by_log else _stamp_ns(message.header)
-            if hasattr(message, 'transform'):
-                yield frame, stamp_ns, _transform(message.transform)
-            else:
-                # With covariance there is a pose in the pose.
-                yield frame, stamp_ns, _pose(getattr(message.pose, 'pose', message.pose))
 
     # /tf and files --------------------------------------------------------------------------
 
@@ -350,17 +286,3 @@ class BagTruth:
         if mount is None or truth.trajectory is None:
             return truth
         return Truth(mounted(truth.trajectory, mount), f'{truth.text}, with the extrinsics given')
-
-
-def _stamp_ns(header: Any) -> int:
-    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
-
-
-def _pose(pose: Any) -> tuple[float, ...]:
-    place, turn = pose.position, pose.orientation
-    return place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w
-
-
-def _transform(transform: Any) -> tuple[float, ...]:
-    place, turn = transform.translation, transform.rotation
-    return place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w

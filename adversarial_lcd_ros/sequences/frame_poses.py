@@ -102,7 +102,8 @@ def image_poses(path: Path, ticks_ns: NDArray[np.int64],
     return poses.stamp_ns, poses
 
 
-def by_number(poses: Trajectory, stamps_ns: NDArray[np.int64], path: Path) -> Trajectory:
+def by_number(poses: Trajectory, stamps_ns: NDArray[np.int64],
+              source: Path | str) -> Trajectory:
     """
     Return poses whose stamps are the numbers of frames with the stamps of these frames.
 
@@ -115,7 +116,7 @@ def by_number(poses: Trajectory, stamps_ns: NDArray[np.int64], path: Path) -> Tr
     numbers = poses.stamp_ns // _NS
     if first < 0:
         raise SequenceError(
-            f'the stamps of {path} are the numbers {numbers[0]} to {numbers[-1]} of '
+            f'the stamps of {source} are the numbers {numbers[0]} to {numbers[-1]} of '
             f'{len(stamps_ns)} frames, but nobody can tell whether these count from 0 or from 1: '
             'give the stamps in seconds, or a pose for the first or the last frame')
     return Trajectory(stamps_ns[numbers - first], poses.position, poses.quaternion,
@@ -159,14 +160,21 @@ def parse_extrinsics(words: Sequence[str]) -> NDArray[np.float64]:
 
 def _first_number(poses: Trajectory, stamps_ns: NDArray[np.int64]) -> int | None:
     """Return the number of the first frame, -1 if unclear; None: the stamps are times."""
-    whole = not (poses.stamp_ns % _NS).any()
-    last = int(poses.stamp_ns[-1]) // _NS
-    if (len(poses) < _FEWEST or not whole or last > len(stamps_ns)
+    count, last = len(stamps_ns), int(poses.stamp_ns[-1]) // _NS
+    if (len(poses) < _FEWEST or (poses.stamp_ns % _NS).any() or last > count
             or _same_time(poses.stamp_ns, stamps_ns)):
         return None
+    if len(poses) < count and _within(poses.stamp_ns, stamps_ns):
+        # A pose a second, on a clock that started with the frames.
+        return None
     if poses.stamp_ns[0] == 0:
-        return 0 if last < len(stamps_ns) else None
-    return 1 if last == len(stamps_ns) else -1
+        return 0 if last < count else None
+    return 1 if last == count else -1
+
+
+def _within(inner_ns: NDArray[np.int64], outer_ns: NDArray[np.int64]) -> bool:
+    return bool(inner_ns[0] >= outer_ns[0] - TOLERANCE_NS
+                and inner_ns[-1] <= outer_ns[-1] + TOLERANCE_NS)
 
 
 def _same_time(first_ns: NDArray[np.int64], second_ns: NDArray[np.int64]) -> bool:
