@@ -66,9 +66,9 @@ def test_a_recording_is_reported_as_it_is(run, tmp_path, capsys):
     summary, page = evaluate(bag, tmp_path)
     assert not summary['labelled']
     assert summary['frames'] == COUNT
-    attack, = summary['attacks']
+    before, attack = summary['rows']
     clean = run_offline(run[0], LCD)[0].decisions
-    assert summary['clean']['loops_declared'] == sum(d.is_loop for d in clean)
+    assert before['loops_declared'] == sum(d.is_loop for d in clean)
     assert attack['loops_declared'] == sum(d.is_loop for d in run[2])
     assert attack['changed'] > 0
     assert attack['queries_total'] == sum(report.queries for report in run[3])
@@ -93,7 +93,7 @@ def test_frames_that_are_not_whole_are_left_out_and_counted(run, tmp_path):
 
 def test_without_reports_queries_are_not_known(run, tmp_path):
     summary, page = evaluate(record(tmp_path / 'bag', run, leave_out=('attack_report',)), tmp_path)
-    attack, = summary['attacks']
+    _, attack = summary['rows']
     assert attack['queries_mean'] is attack['edit_budget_mean'] is None
     assert attack['edits_mean'] == sum(report.edits for report in run[3]) / COUNT
     assert 'no attack reports were recorded' in summary['notes'][0]

@@ -351,7 +351,7 @@ def test_no_attack_that_could_be_made_is_no_rate(bare_records):
 def test_the_report_without_ground_truth_says_what_is_missing(bare, bare_records, tmp_path):
     folder = results.ResultsFolder.create(tmp_path, datetime(2026, 1, 1, tzinfo=timezone.utc))
     folder.write_setup([LcdConfig()], ['adversarial-lcd', 'evaluate'], 42)
-    folder.write_json('summary.json', bare)
+    folder.write_json('summary.json', as_document(bare))
     write_records(folder.path / 'per_query.csv', bare_records)
     page = report.write_report(folder.path, bare, bare_records, []).read_text()
     for said in ('What each attack changed', 'No accuracy, precision, recall or curve',

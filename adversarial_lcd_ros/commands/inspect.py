@@ -28,8 +28,8 @@ def add(commands: Commands) -> None:
     """Declare the command."""
     parser = add_command(commands, 'inspect', 'Print what a recording, a payload or a results '
                          'folder holds.', _inspect)
-    parser.add_argument('path', type=Path, help='recording of any form that "import" reads, a file '
-                        'with the payload of one message, or a results folder')
+    parser.add_argument('path', type=Path, help='recording of any form that "import" reads, a '
+                        'file with the payload of one message, or a results folder')
     add_json_option(parser)
     add_source_options(parser)
 
