@@ -77,6 +77,8 @@ def test_a_recording_is_reported_as_it_is(run, tmp_path, capsys):
     repeated = f'repeats {COUNT} of {COUNT} recorded decisions'
     assert repeated in page
     assert repeated in capsys.readouterr().err
+    assert main(['inspect', str(tmp_path / 'results' / 'latest')]) == 0
+    assert 'Decisions changed' in capsys.readouterr().out
 
 
 def test_other_settings_are_noticed(run, tmp_path):
