@@ -154,7 +154,7 @@ def robot_bag(path, count):
 def test_a_robots_bag_goes_from_file_to_report_by_one_command(tmp_path, capsys):
     pytest.importorskip('rclpy')
     recipe = tmp_path / 'one.yaml'
-    recipe.write_text('attacks: [{name: recall, perturbation: recall, max_queries: 2}]')
+    recipe.write_text('attacks: [{name: recall, search: recall, max_queries: 2}]')
     line = ['evaluate', str(robot_bag(tmp_path / 'robot', 8)), '--output',
             str(tmp_path / 'results'), '--builder-detector', 'none', '--recipe', str(recipe)]
     assert main(line) == 0

@@ -27,7 +27,7 @@ def run():
     """Return clean graphs, two laps, with what attacker and detector make of them."""
     clean = [replace(graph_of(k % 12), stamp_ns=k * 10**9, sequence=k) for k in range(COUNT)]
     made, forwarded = run_offline(clean, LCD, AttackConfig(
-        perturbation='recall', surrogate='none', ratio=0.004, max_queries=6))
+        search='recall', ratio=0.004, max_queries=6))
     return clean, forwarded, made.decisions, made.reports
 
 
