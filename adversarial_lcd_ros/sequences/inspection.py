@@ -143,7 +143,7 @@ def inspect_payload(path: Path) -> tuple[str, Any]:
         raise CodecError(f'{path} cannot be read: {error.strerror}') from error
     if not name:
         raise CodecError(f'{path} is neither a bag nor a payload of '
-                         f'{", ".join(codec.MESSAGES)}')
+                         f'{", ".join(codec.MESSAGES)}{_nearly(path.read_bytes())}')
     return name, content
 
 
@@ -158,3 +158,14 @@ def payload_values(content: Any) -> dict[str, Any]:
     return {name: payload_values(value) if isinstance(value, MultiTierGraph)
             else value.tolist() if isinstance(value, np.ndarray) else value
             for name, value in values.items()}
+
+
+def _nearly(data: bytes) -> str:
+    """Tell why the message was refused whose layout the data have, if they have one's."""
+    for name, decode in _DECODERS.items():
+        try:
+            decode(data)
+        except CodecError as error:
+            if error.cause not in (CodecError.cause, 'version', 'counts'):
+                return f'; read as {name}: {error}'
+    return ''
