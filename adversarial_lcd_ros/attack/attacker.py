@@ -9,7 +9,13 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.oracle import Ask, Oracle, OracleSilentError, edit_budget
+from adversarial_lcd_ros.attack.oracle import (
+    DEADLINE,
+    Ask,
+    Oracle,
+    OracleSilentError,
+    edit_budget,
+)
 from adversarial_lcd_ros.attack.search import Hunt
 from adversarial_lcd_ros.attack.searches import make_search
 from adversarial_lcd_ros.codec import AttackReport
@@ -74,6 +80,7 @@ class Attacker:
 
     def __init__(self, config: AttackConfig | None = None) -> None:
         self.config = config or AttackConfig()
+        self._under_way: tuple[Hunt, float] | None = None
         self._search = make_search(self.config)
 
     def process(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
@@ -97,8 +104,19 @@ class Attacker:
         """Remember a graph that goes by."""
         self._search.observe(graph)
 
-    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
-        """Return what ``process`` returns, without remembering the graph."""
+    def attack(self, graph: MultiTierGraph, ask: Ask,
+               deadline_s: float | None = None) -> AttackResult:
+        """
+        Return what ``process`` returns, without remembering the graph.
+
+        Parameters
+        ----------
+        graph, ask
+            See ``process``.
+        deadline_s : float, optional
+            ``time.monotonic()`` at which the attack ends; ``deadline_ms`` from now if not given.
+
+        """
         edits = edit_budget(graph.node_count, self.config.ratio)
         queries = min(edits * self.config.queries_per_edit, self.config.max_queries)
         if self.config.mode == 'pass':
@@ -111,18 +129,38 @@ class Attacker:
             return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
         if queries < 2:
             return AttackResult(graph, graph, 'skipped', 'query budget below two', edits, queries)
-        return self._hunt(graph, edits, queries, ask, rng)
+        if deadline_s is None:
+            deadline_s = (time.monotonic() + self.config.deadline_ms / 1e3
+                          if self.config.deadline_ms else math.inf)
+        return self._hunt(graph, edits, Oracle(ask, queries, deadline_s), rng)
 
-    def _hunt(self, graph: MultiTierGraph, edits: int, queries: int, ask: Ask,
+    def so_far(self, graph: MultiTierGraph) -> AttackResult:
+        """
+        Return what the attack on a graph, under way in another thread, has come to.
+
+        A search asks for the time only between its steps; whoever cannot wait for the end of
+        one takes this.
+        """
+        hunt, before = self._under_way or (None, 0.0)
+        edits = edit_budget(graph.node_count, self.config.ratio)
+        if hunt is None or hunt.clean is not graph:
+            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
+        best, loss, succeeded = hunt.kept or (graph, before, False)
+        return AttackResult(graph, best, 'success' if succeeded else 'failure', DEADLINE, edits,
+                            hunt.oracle.budget, hunt.oracle.used, before, loss,
+                            tuple(hunt.trace))
+
+    def _hunt(self, graph: MultiTierGraph, edits: int, oracle: Oracle,
               rng: np.random.Generator) -> AttackResult:
-        deadline = (time.monotonic() + self.config.deadline_ms / 1e3
-                    if self.config.deadline_ms else math.inf)
-        oracle = Oracle(ask, queries, deadline)
+        queries = oracle.budget
         try:
             hunt = Hunt.begin(graph, edits, oracle)
         except OracleSilentError:
             return AttackResult(graph, graph, 'skipped', 'no answer', edits, queries, oracle.used)
+        except BudgetError:
+            return AttackResult(graph, graph, 'skipped', oracle.exhausted, edits, queries)
         before = hunt.loss
+        self._under_way = hunt, before
         try:
             reason = self._search.hunt(hunt, rng)
         except OracleSilentError:
