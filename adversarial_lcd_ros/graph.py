@@ -302,9 +302,15 @@ class MultiTierGraph:
             The nodes differ: the graphs are not perturbations of each other.
 
         """
+        if other is self:
+            return np.zeros((0, 2), np.uint32)
         if self.node_digest != other.node_digest:
             raise GraphError('the nodes of the two graphs differ: edge flips cannot relate them')
-        key = np.setxor1d(self.edge_key, other.edge_key, assume_unique=True)
+        # Both ascend: the stable sort only merges them. An edge of both comes twice.
+        merged = np.sort(np.concatenate([self.edge_key, other.edge_key]), kind='stable')
+        twice = np.zeros(len(merged), bool)
+        twice[:-1] = merged[1:] == merged[:-1]
+        key = merged[~(twice | np.roll(twice, 1))]
         return np.stack([key // max(self.node_count, 1), key % max(self.node_count, 1)],
                         axis=1).astype(np.uint32)
 

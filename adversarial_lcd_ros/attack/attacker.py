@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.deadline import ending_at
 from adversarial_lcd_ros.attack.oracle import (
     DEADLINE,
     Ask,
@@ -56,7 +58,7 @@ class AttackResult:
     loss_after: float = 0.0
     trace: tuple[float, ...] = ()
 
-    @property
+    @cached_property
     def flips(self) -> NDArray[np.uint32]:
         """Pairs that differ between the clean and the forwarded graph, shape (k, 2)."""
         return self.clean.flips_to(self.perturbed)
@@ -124,15 +126,23 @@ class Attacker:
         if not edits:
             return AttackResult(graph, graph, 'skipped', 'edit budget below one')
         rng = np.random.default_rng((self.config.seed, graph.sequence))
-        if self.config.mode == 'surrogate':
-            guess = self._search.guess(graph, edits, rng)
-            return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
-        if queries < 2:
-            return AttackResult(graph, graph, 'skipped', 'query budget below two', edits, queries)
         if deadline_s is None:
             deadline_s = (time.monotonic() + self.config.deadline_ms / 1e3
                           if self.config.deadline_ms else math.inf)
-        return self._hunt(graph, edits, Oracle(ask, queries, deadline_s), rng)
+        if self.config.mode != 'surrogate' and queries < 2:
+            return AttackResult(graph, graph, 'skipped', 'query budget below two', edits, queries)
+        with ending_at(deadline_s):
+            if self.config.mode == 'surrogate':
+                return self._guess(graph, edits, rng)
+            return self._hunt(graph, edits, Oracle(ask, queries, deadline_s), rng)
+
+    def _guess(self, graph: MultiTierGraph, edits: int, rng: np.random.Generator
+               ) -> AttackResult:
+        try:
+            guess = self._search.guess(graph, edits, rng)
+        except BudgetError:
+            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
+        return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
 
     def so_far(self, graph: MultiTierGraph) -> AttackResult:
         """
