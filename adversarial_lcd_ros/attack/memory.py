@@ -18,6 +18,7 @@ MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76
 CACHED = 256
 MAX_OBJECTS = 256
+MAX_BYTES = 2 ** 32
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,9 @@ class Memory:
         self._lanes = lru_cache(CACHED)(lambda index: _feature_lanes(self._database[index]))
 
     def add(self, graph: MultiTierGraph) -> None:
-        """Remember a graph as it was forwarded."""
-        self._database.add(graph)
+        """Remember a graph as it was forwarded, while there is room."""
+        if self._database.memory < MAX_BYTES:
+            self._database.add(graph)
 
     def too_young(self, stamp_ns: int) -> None:
         """Learn that at this time the detector compared with nothing, not even the oldest."""

@@ -164,7 +164,13 @@ class MirroredSubscription:
         mine = QoSProfile(depth=self._depth, reliability=wanted[0], durability=wanted[1])
         self.subscription = self._node.create_subscription(
             self._message, self._topic, self._callback, mine, raw=self._raw,
-            qos_overriding_options=overridable())
+            qos_overriding_options=self._overrides())
+
+    def _overrides(self) -> QoSOverridingOptions:
+        """Return the policies that were overridden; the others must stay free to follow."""
+        given = self._node.get_parameters_by_prefix(f'qos_overrides.{self.topic}.subscription')
+        return QoSOverridingOptions([policy for policy in overridable().policy_kinds
+                                     if policy.name.lower() in given])
 
     def _watch(self) -> None:
         publishers = self._node.get_publishers_info_by_topic(self._topic)
