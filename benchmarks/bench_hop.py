@@ -86,6 +86,9 @@ class Probe:
         self._hear('graph', lambda _: self.arrived.append(time.perf_counter()))
         self._hear('attack_report', lambda wire: self.reports.append(
             codec.decode_attack_report(unwrap(wire))))
+        self.decisions = []
+        self.graphs = self._publisher('graph')
+        self._hear('loop_closures', lambda _: self.decisions.append(time.perf_counter()))
         self._oracle = self._publisher('answer')
         self._hear('query', self._reply)
         self._hear('answer', lambda _: self.answers.append(time.perf_counter()))
@@ -95,6 +98,11 @@ class Probe:
 
     def _hear(self, topic, callback):
         self._node.create_subscription(UInt8MultiArray, topic, callback, payload_qos(), raw=True)
+
+    def decided_by(self):
+        """Tell whether a detector hears the graphs of this probe, and is heard."""
+        return (self._node.count_publishers('loop_closures')
+                and self._node.count_subscribers('graph') > 1)
 
     def _reply(self, wire):
         """Answer at once, in place of a detector, where none runs."""
@@ -180,6 +188,25 @@ def test_query_guided_keeps_its_deadline(measured, probe, tour_graphs):
     measured('hop', f'n = {graphs[0].node_count}, query-guided, deadline {DEADLINE_S * 1e3:g} ms, '
              'longest beside deadline and longest query',
              max(report.duration_s for report in reports), mark=DEADLINE_S + asked.max())
+
+
+def test_a_flood_of_queries_delays_a_decision_by_one_query(measured, probe, tour_graphs):
+    graphs = stream(tour_graphs(300))[:WARM_UP + 60]
+    wires = [wrap(codec.encode_graph(graph)) for graph in graphs]
+    query = wrap(codec.encode_query(LcdQuery(1, tour_graphs(5000)[-1])))
+    with process(LCD, min_gap_s=0.5):
+        probe.until(lambda: probe.queries.get_subscription_count() and probe.decided_by())
+        alone = probe.round_trips(probe.graphs, probe.decisions, wires[:WARM_UP + 30])[WARM_UP:]
+        asked_s = probe.round_trips(probe.queries, probe.answers, [query]).max()
+        for _ in range(100):
+            probe.queries.publish(query)
+        flooded = []
+        for wire in wires[WARM_UP + 30:]:
+            probe.queries.publish(query)
+            flooded += probe.round_trips(probe.graphs, probe.decisions, [wire]).tolist()
+    measured('decision', 'n = 303, beside a flood of queries with 5,000 features, p50',
+             np.median(flooded), 'without queries', np.median(alone),
+             mark=np.median(alone) + asked_s)
 
 
 def hostile_graphs(size, objects, edges):

@@ -315,6 +315,25 @@ def test_the_best_so_far_goes_out_at_the_deadline(ros, monkeypatch):
     assert reports[0].loss_after == pytest.approx(reports[0].loss_before + 1)
 
 
+def test_a_frozen_detector_shows_under_a_deadline_too(ros):
+    node = ros.start(AttackerNode, ratio=0.01, deadline_ms=20.0, max_backlog=100)
+    ros.collect('query', bytes)  # hears, and says nothing
+    reports = ros.collect('attack_report',
+                          lambda wire: codec.decode_attack_report(unwrap(wire)))
+    out = ros.collect('graph', bytes)
+    clean = ros.publisher('graph_clean')
+    ros.matched(clean)
+    ros.matched(node._oracle._queries)
+    for index in range(6):
+        clean.publish(wire_of(index))
+        ros.until(lambda count=index + 1: len(reports) == len(out) == count)
+    assert {report.reason for report in reports} == {'deadline', 'no answer'}
+    assert node.diagnostics['queries without answer'] >= 1
+    level, line, _ = status_of(ros, node)
+    assert level == DiagnosticStatus.WARN
+    assert 'queries without answer' in line
+
+
 @pytest.fixture
 def builder(ros, vocabulary):
     return ros.start(GraphBuilderNode, detector='none', vocabulary=vocabulary, features=50)

@@ -32,6 +32,8 @@ _NOUNS = dict.fromkeys(GRAPHS, 'graph') | {DECISIONS: 'loop closure', REPORTS: '
 _DEPTH = 10
 _CLOCK_PERIOD_S = 0.025
 _SPIN_S = 0.1
+# A gap that looks like a replay which hangs.
+_LONG_S = 10.0
 # The other ends have matched as seen from here; this is for them to see it too, and each other.
 # A quarter of a second was too short once on a busy machine: the first graph was lost.
 _SETTLE_S = 1.0
@@ -219,6 +221,10 @@ class BagReplayNode(PipelineNode):
             self._origin = time.monotonic(), stamp_ns
         origin_s, origin_ns = self._origin
         due_s = origin_s + (stamp_ns - origin_ns) * 1e-9 / self._config.rate
+        if due_s - time.monotonic() > _LONG_S:
+            self.diagnostics.worry(
+                'stamps that jumped', f'the next message, with stamp {stamp_ns} ns, is due in '
+                f'{due_s - time.monotonic():.0f} s; start_s leaves out what is before it')
         while (now_s := time.monotonic()) < due_s:
             if now_s >= self._clock_due_s:
                 self._tell_time(origin_ns + round((now_s - origin_s) * 1e9 * self._config.rate))
