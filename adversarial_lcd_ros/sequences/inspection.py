@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+import math
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +157,9 @@ def payload_values(content: Any) -> dict[str, Any]:
                 'stamp_ns': content.stamp_ns, 'frame_id': content.frame_id}
     values = {entry.name: getattr(content, entry.name) for entry in fields(content)}
     return {name: payload_values(value) if isinstance(value, MultiTierGraph)
-            else value.tolist() if isinstance(value, np.ndarray) else value
+            else value.tolist() if isinstance(value, np.ndarray)
+            # JSON has no word for the log odds of certainty.
+            else None if value in (math.inf, -math.inf) else value
             for name, value in values.items()}
 
 
