@@ -235,13 +235,15 @@ LARGEST = {'10,000 nodes, 200,000 edges': (10_000, 0, 190_000),
 
 
 @pytest.mark.parametrize('mode', ['query', 'surrogate'])
-@pytest.mark.parametrize('perturbation', PERTURBATIONS)
+@pytest.mark.parametrize('perturbation', [*PERTURBATIONS, 'recall'])
 def test_the_largest_graphs_keep_the_deadline(measured, probe, perturbation, mode):
     late = {}
     for name, size in LARGEST.items():
         wires = [wrap(codec.encode_graph(graph)) for graph in hostile_graphs(*size)]
         probe.reports.clear()
-        with process(ATTACKER, perturbation=perturbation, **QUERY | {'mode': mode}):
+        search = ({'search': 'recall'} if perturbation == 'recall' else
+                  {'perturbation': perturbation})
+        with process(ATTACKER, **search, **QUERY | {'mode': mode}):
             probe.until(lambda: probe.clean.get_subscription_count())
             probe.round_trips(probe.clean, probe.arrived, wires)
             probe.until(lambda: len(probe.reports) == HOSTILE)
