@@ -113,6 +113,25 @@ def names_in(text: str) -> list[str]:
 
 
 @dataclass(frozen=True)
+class MessageLimits(Config):
+    """The largest messages that are taken in: hostile ones must not cost time or memory."""
+
+    title: ClassVar[str] = 'limits of messages'
+
+    max_nodes: int = setting(
+        10_000, 'Most nodes of a graph that is taken in.', low=1, high=1_000_000)
+    max_edges: int = setting(
+        200_000, 'Most edges of a graph that is taken in.', low=1, high=10_000_000)
+    max_words: int = setting(
+        20_000, 'Most visual words of a graph that is taken in.', low=1, high=1_000_000)
+    max_pixels: int = setting(
+        2 ** 25, 'Most pixels of an image that is taken in (width times height, as its header '
+        'says); 2^25 is 8K.', low=1, high=2 ** 30)
+    max_payload_bytes: int = setting(
+        2 ** 24, 'Most bytes of a payload that is taken in.', low=1024, high=2 ** 30)
+
+
+@dataclass(frozen=True)
 class BuilderConfig(Config):
     """Camera image to multi-tier graph (paper, Fig. 2 a-c)."""
 
@@ -189,6 +208,9 @@ class LcdConfig(Config):
     max_keyframes: int = setting(
         100_000, 'Most keyframes remembered; further graphs are judged but not stored.',
         low=1, high=10_000_000)
+    max_keyframe_mb: int = setting(
+        4096, 'Most memory of keyframes, MB; further graphs are judged but not stored. A graph '
+        'of 300 features takes about 0.1.', low=1, high=10_000_000)
 
 
 @dataclass(frozen=True)
@@ -221,8 +243,8 @@ class AttackConfig(Config):
     max_queries: int = setting(
         100_000, 'Query budget of a graph, whatever its edit budget.', low=0, high=10_000_000)
     deadline_ms: float = setting(
-        0.0, 'Query-guided: after this time the best graph so far is forwarded, '
-        'milliseconds; 0: no deadline.', low=0.0, high=1e7)
+        0.0, 'After this time the best graph so far is forwarded, milliseconds, in the node '
+        'counted from its arrival; 0: no deadline.', low=0.0, high=1e7)
     surrogate_data: str = setting(
         '', 'Surrogate mode: queried flips (npz) that the surrogate learns from; empty: those '
         'that ship.')
@@ -338,6 +360,17 @@ class GraphBuilderNodeConfig(Config):
     detections_wait_ms: float = setting(
         300.0, 'Detector topic: a frame waits so long for its detections, milliseconds; then its '
         'graph goes out without objects. At most queue_depth frames wait.', low=0.0, high=1e6)
+
+
+@dataclass(frozen=True)
+class LcdNodeConfig(Config):
+    """What the lcd node has beside LcdConfig."""
+
+    title: ClassVar[str] = 'lcd node'
+
+    max_queries_per_s: int = setting(
+        10_000, 'Queries beyond so many in a second are refused. Graphs that wait are decided '
+        'before any query in any case.', low=1, high=10_000_000)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,22 @@
 
 
 class AdversarialLcdError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """
+    Base of every error that this package raises on purpose.
+
+    Attributes
+    ----------
+    cause : str
+        One stable word or two, under which a node counts what it refuses; see docs/nodes.md.
+
+    """
+
+    cause = 'other'
+
+    def __init__(self, *what: object, cause: str = '') -> None:
+        super().__init__(*what)
+        if cause:
+            self.cause = cause
 
 
 class ConfigError(AdversarialLcdError):
@@ -12,17 +27,25 @@ class ConfigError(AdversarialLcdError):
 class GraphError(AdversarialLcdError):
     """Arrays that do not form a valid multi-tier graph."""
 
+    cause = 'graph'
+
 
 class CodecError(AdversarialLcdError):
     """A payload that is not what its schema says."""
+
+    cause = 'unreadable'
 
 
 class SequenceError(AdversarialLcdError):
     """A bag, folder or ground truth that is missing, truncated, empty or out of order."""
 
+    cause = 'sequence'
+
 
 class ModelError(AdversarialLcdError):
     """A vocabulary, object model or target model that is missing or of the wrong form."""
+
+    cause = 'model'
 
 
 class BudgetError(AdversarialLcdError):

@@ -71,6 +71,9 @@ class MultiTierGraph:
         Words of the vBoW vector, ascending. All features of the frame count, not the nodes only.
     word_weight : float32, (w,)
         Their tf-idf weights, L1-normalised.
+    session : int
+        Which run of the builder made it; 0 outside a node. Two graphs that differ in nothing
+        else are equal.
 
     """
 
@@ -89,6 +92,7 @@ class MultiTierGraph:
     edge_length: NDArray[np.float32] = _empty(np.float32, 0)
     word: NDArray[np.uint32] = _empty(np.uint32, 0)
     word_weight: NDArray[np.float32] = _empty(np.float32, 0)
+    session: int = 0
 
     def __post_init__(self) -> None:
         """Check every count, index and range; freeze the arrays."""
@@ -103,37 +107,45 @@ class MultiTierGraph:
         self._check_nodes()
         self._check_edges(count)
         if words and ((self.word[1:] <= self.word[:-1]).any() or self.word_weight.min() < 0):
-            raise GraphError('vBoW words must ascend without repeats and have weights >= 0')
+            raise GraphError('vBoW words must ascend without repeats and have weights >= 0',
+                             cause='word')
 
     def _check_array(self, name: str, dtype: type, shape: tuple[int, ...]) -> None:
         array = getattr(self, name)
         if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != shape:
             found = (f'{array.dtype}{array.shape}' if isinstance(array, np.ndarray)
                      else type(array).__name__)
-            raise GraphError(f'{name}: expected {np.dtype(dtype)}{shape}, found {found}')
+            raise GraphError(f'{name}: expected {np.dtype(dtype)}{shape}, found {found}',
+                             cause='counts')
         if array.dtype.kind == 'f' and not np.isfinite(array).all():
-            raise GraphError(f'{name}: {int((~np.isfinite(array)).sum())} values are not finite')
+            raise GraphError(f'{name}: {int((~np.isfinite(array)).sum())} values are not finite',
+                             cause='not finite')
         array.flags.writeable = False
 
     def _check_nodes(self) -> None:
         if not 0 < self.width < 2**31 or not 0 < self.height < 2**31:
-            raise GraphError(f'image size {self.width} x {self.height}: expected positive pixels')
+            raise GraphError(f'image size {self.width} x {self.height}: expected positive pixels',
+                             cause='image size')
         if np.any(self.tier > FEATURE_TIER):
-            raise GraphError(f'tier {int(self.tier.max())}: expected 0 (object) or 1 (feature)')
+            raise GraphError(f'tier {int(self.tier.max())}: expected 0 (object) or 1 (feature)',
+                             cause='tier')
         if (self.tier[1:] < self.tier[:-1]).any():
-            raise GraphError('objects (tier 0) must come before features (tier 1)')
+            raise GraphError('objects (tier 0) must come before features (tier 1)', cause='tier')
 
     def _check_edges(self, count: int) -> None:
         if not len(self.edge):
             return
         if self.edge.max() >= count:
-            raise GraphError(f'edge to node {int(self.edge.max())}: the graph has {count} nodes')
+            raise GraphError(f'edge to node {int(self.edge.max())}: the graph has {count} nodes',
+                             cause='edge')
         if (self.edge[:, 0] >= self.edge[:, 1]).any():
-            raise GraphError('every edge needs source < target (no self-loops)')
+            raise GraphError('every edge needs source < target (no self-loops)', cause='edge')
         if (self.edge_key[1:] <= self.edge_key[:-1]).any():
-            raise GraphError('edges must be sorted by source, then target, without repeats')
+            raise GraphError('edges must be sorted by source, then target, without repeats',
+                             cause='edge')
         if self.edge_length.min() < 0:
-            raise GraphError(f'edge length {float(self.edge_length.min()):g}: expected >= 0')
+            raise GraphError(f'edge length {float(self.edge_length.min()):g}: expected >= 0',
+                             cause='edge length')
 
     @property
     def node_count(self) -> int:
@@ -144,6 +156,12 @@ class MultiTierGraph:
     def edge_count(self) -> int:
         """Number of undirected edges, m."""
         return len(self.edge)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(getattr(self, name).nbytes for name in (
+            *_NODE_ARRAYS, 'edge', 'edge_length', 'word', 'word_weight'))
 
     @property
     def object_count(self) -> int:
@@ -284,17 +302,23 @@ class MultiTierGraph:
             The nodes differ: the graphs are not perturbations of each other.
 
         """
+        if other is self:
+            return np.zeros((0, 2), np.uint32)
         if self.node_digest != other.node_digest:
             raise GraphError('the nodes of the two graphs differ: edge flips cannot relate them')
-        key = np.setxor1d(self.edge_key, other.edge_key, assume_unique=True)
+        # Both ascend: the stable sort only merges them. An edge of both comes twice.
+        merged = np.sort(np.concatenate([self.edge_key, other.edge_key]), kind='stable')
+        twice = np.zeros(len(merged), bool)
+        twice[:-1] = merged[1:] == merged[:-1]
+        key = merged[~(twice | np.roll(twice, 1))]
         return np.stack([key // max(self.node_count, 1), key % max(self.node_count, 1)],
                         axis=1).astype(np.uint32)
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether every field is equal, arrays byte by byte."""
+        """Tell whether every field but the session is equal, arrays byte by byte."""
         if not isinstance(other, MultiTierGraph):
             return NotImplemented
         return all(np.array_equal(getattr(self, name), getattr(other, name))
-                   for name in self.__dataclass_fields__)
+                   for name in self.__dataclass_fields__ if name != 'session')
 
     __hash__ = None  # type: ignore[assignment]

@@ -20,12 +20,18 @@ def wrap(payload: bytes) -> bytes:
     return bytes(typestore().serialize_cdr(types[WIRE_TYPE](layout=layout, data=data), WIRE_TYPE))
 
 
-def unwrap(wire: bytes) -> bytes:
+def unwrap(wire: bytes, max_bytes: int = MAX_PAYLOAD_BYTES) -> bytes:
     """
     Return the payload that the CDR of a UInt8MultiArray carries.
 
     Subscriptions take these messages raw: a message broken on the outside as well is seen,
     counted and, by the attacker, forwarded, where rclpy would lose it without a word.
+
+    Parameters
+    ----------
+    wire : bytes
+    max_bytes : int
+        Most bytes of the message.
 
     Raises
     ------
@@ -33,8 +39,9 @@ def unwrap(wire: bytes) -> bytes:
         The bytes are no such message, or an unreasonably large one.
 
     """
-    if len(wire) > MAX_PAYLOAD_BYTES:
-        raise CodecError(f'message of {len(wire)} bytes: at most {MAX_PAYLOAD_BYTES} are accepted')
+    if len(wire) > max_bytes:
+        raise CodecError(f'message of {len(wire)} bytes: at most {max_bytes} are accepted',
+                         cause='bytes')
     try:
         message: Any = typestore().deserialize_cdr(wire, WIRE_TYPE)
     except Exception as error:

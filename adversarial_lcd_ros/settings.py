@@ -27,6 +27,8 @@ from adversarial_lcd_ros.config import (
     GraphBuilderNodeConfig,
     LabelConfig,
     LcdConfig,
+    LcdNodeConfig,
+    MessageLimits,
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError
@@ -35,9 +37,9 @@ from adversarial_lcd_ros.registry import Table
 
 # The parameters of a node are the settings of its classes.
 NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
-    'graph_builder': (BuilderConfig, GraphBuilderNodeConfig),
-    'lcd': (LcdConfig,),
-    'attacker': (AttackConfig, AttackerNodeConfig),
+    'graph_builder': (BuilderConfig, GraphBuilderNodeConfig, MessageLimits),
+    'lcd': (LcdConfig, LcdNodeConfig, MessageLimits),
+    'attacker': (AttackConfig, AttackerNodeConfig, MessageLimits),
     'bag_replay': (ReplayConfig, BagReplayNodeConfig),
 }
 # The sections of a settings file.

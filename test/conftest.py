@@ -26,3 +26,12 @@ def shared_data():
             pytest.skip(f'{path} is not on this machine')
         return path
     return folder
+
+
+@pytest.fixture
+def shared_cases():
+    """Return the folder of odd inputs; skip, saying so, where it is absent."""
+    path = SHARED_DATA.parent / 'cases'
+    if not path.is_dir():
+        pytest.skip(f'{path} is not on this machine')
+    return path

@@ -315,6 +315,22 @@ def test_flip_features_are_the_difference_that_a_flip_makes(graph, seed, iterati
         assert row == pytest.approx(graph.node_count * change, abs=1e-6)
 
 
+@pytest.mark.parametrize('spokes', [5, 40])
+def test_flips_at_hubs_have_the_features_that_all_others_have(spokes):
+    # Two hubs that share half of their neighbours: sums over these are made once for a graph.
+    leaves = range(2, 2 + spokes)
+    graph = make_graph(2 + spokes, [*((0, leaf) for leaf in leaves),
+                                    *((1, leaf) for leaf in leaves if leaf % 2),
+                                    *((leaf, leaf + 1) for leaf in list(leaves)[:-1:3])])
+    x = node_features(graph)
+    pairs = np.array([(a, b) for a in (0, 1, 2, 3) for b in range(a + 1, graph.node_count)])
+    found = flip_features(graph, x, pairs, 2)
+    before = pooled_features(graph, x, 2)
+    for row, pair in zip(found, pairs, strict=True):
+        made = graph.node_count * (pooled_features(graph.flip([pair]), x, 2) - before)
+        np.testing.assert_allclose(row, made, atol=1e-10)
+
+
 def blobs(seed=0, rows=80):
     rng = np.random.default_rng(seed)
     gain = np.where(rng.random(rows) < 0.5, 1.0, -1.0)

@@ -250,8 +250,10 @@ def test_the_geometric_check_wants_one_motion_for_all_features(model):
     assert checked.is_loop
 
 
-def test_a_full_database_goes_on_judging(model):
-    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, max_keyframes=1))
+@pytest.mark.parametrize('limit', ['max_keyframes', 'max_keyframe_mb'])
+def test_a_full_database_goes_on_judging(model, limit):
+    # The first keyframe takes a block of 16 MB.
+    detector = LoopClosureDetector(LcdConfig(model=model(), min_gap_s=1.0, **{limit: 1}))
     detector.detect(at(0))
     detector.detect(at(2, seed=1))
     assert detector.keyframe_count == 1

@@ -116,6 +116,37 @@ def test_messages_are_published_byte_for_byte_with_clock(ros, bag, frames):
     assert set(STAMPS) <= set(clock)
 
 
+def test_a_clock_that_jumped_is_said(ros, bag):
+    ros.collect('image/compressed', bytes, CompressedImage)
+    node = replay(ros, bag, rate=0.001)
+    stopped = 'stamps that jumped'
+    assert node.work(lambda seconds: ros.spin(seconds) and not node.diagnostics[stopped]) == 0
+    assert node.diagnostics[stopped] == 1
+
+
+def test_a_recording_that_cannot_be_written_ends_the_replay(ros, bag, pipeline, tmp_path,
+                                                            monkeypatch):
+    node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'))
+
+    def full(*_):
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(node._recorder, 'write', full)
+    with pytest.raises(OSError, match='No space'):
+        node.work(ros.spin)
+
+
+def test_a_restarted_detector_and_answers_nobody_asked_for_are_said(ros, bag):
+    node = replay(ros, bag)
+    decisions = ros.publisher('loop_closures')
+    ros.matched(decisions)
+    for session in (3, 3, 4):
+        decisions.publish(wrap(codec.encode_loop_closure(
+            codec.LoopClosure(1, 'camera', 0, False, 0.1, session=session))))
+    ros.until(lambda: node.diagnostics['restarts of lcd'] == 1)
+    assert node.diagnostics['decisions not asked for'] == 3
+
+
 def test_topics_can_be_remapped_and_clock_left_out(ros, bag, frames):
     heard = ros.collect('front/image', bytes, CompressedImage)
     clock = ros.collect('/clock', lambda m: m, Clock, raw=False)

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.oracle import Ask, Oracle, OracleSilentError, edit_budget
+from adversarial_lcd_ros.attack.deadline import ending_at
+from adversarial_lcd_ros.attack.oracle import (
+    DEADLINE,
+    Ask,
+    Oracle,
+    OracleSilentError,
+    edit_budget,
+)
 from adversarial_lcd_ros.attack.search import Hunt
 from adversarial_lcd_ros.attack.searches import make_search
 from adversarial_lcd_ros.codec import AttackReport
@@ -50,7 +58,7 @@ class AttackResult:
     loss_after: float = 0.0
     trace: tuple[float, ...] = ()
 
-    @property
+    @cached_property
     def flips(self) -> NDArray[np.uint32]:
         """Pairs that differ between the clean and the forwarded graph, shape (k, 2)."""
         return self.clean.flips_to(self.perturbed)
@@ -74,6 +82,7 @@ class Attacker:
 
     def __init__(self, config: AttackConfig | None = None) -> None:
         self.config = config or AttackConfig()
+        self._under_way: tuple[Hunt, float] | None = None
         self._search = make_search(self.config)
 
     def process(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
@@ -97,8 +106,19 @@ class Attacker:
         """Remember a graph that goes by."""
         self._search.observe(graph)
 
-    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
-        """Return what ``process`` returns, without remembering the graph."""
+    def attack(self, graph: MultiTierGraph, ask: Ask,
+               deadline_s: float | None = None) -> AttackResult:
+        """
+        Return what ``process`` returns, without remembering the graph.
+
+        Parameters
+        ----------
+        graph, ask
+            See ``process``.
+        deadline_s : float, optional
+            ``time.monotonic()`` at which the attack ends; ``deadline_ms`` from now if not given.
+
+        """
         edits = edit_budget(graph.node_count, self.config.ratio)
         queries = min(edits * self.config.queries_per_edit, self.config.max_queries)
         if self.config.mode == 'pass':
@@ -106,23 +126,51 @@ class Attacker:
         if not edits:
             return AttackResult(graph, graph, 'skipped', 'edit budget below one')
         rng = np.random.default_rng((self.config.seed, graph.sequence))
-        if self.config.mode == 'surrogate':
-            guess = self._search.guess(graph, edits, rng)
-            return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
-        if queries < 2:
+        if deadline_s is None:
+            deadline_s = (time.monotonic() + self.config.deadline_ms / 1e3
+                          if self.config.deadline_ms else math.inf)
+        if self.config.mode != 'surrogate' and queries < 2:
             return AttackResult(graph, graph, 'skipped', 'query budget below two', edits, queries)
-        return self._hunt(graph, edits, queries, ask, rng)
+        with ending_at(deadline_s):
+            if self.config.mode == 'surrogate':
+                return self._guess(graph, edits, rng)
+            return self._hunt(graph, edits, Oracle(ask, queries, deadline_s), rng)
 
-    def _hunt(self, graph: MultiTierGraph, edits: int, queries: int, ask: Ask,
+    def _guess(self, graph: MultiTierGraph, edits: int, rng: np.random.Generator
+               ) -> AttackResult:
+        try:
+            guess = self._search.guess(graph, edits, rng)
+        except BudgetError:
+            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
+        return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
+
+    def so_far(self, graph: MultiTierGraph) -> AttackResult:
+        """
+        Return what the attack on a graph, under way in another thread, has come to.
+
+        A search asks for the time only between its steps; whoever cannot wait for the end of
+        one takes this.
+        """
+        hunt, before = self._under_way or (None, 0.0)
+        edits = edit_budget(graph.node_count, self.config.ratio)
+        if hunt is None or hunt.clean is not graph:
+            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
+        best, loss, succeeded = hunt.kept or (graph, before, False)
+        return AttackResult(graph, best, 'success' if succeeded else 'failure', DEADLINE, edits,
+                            hunt.oracle.budget, hunt.oracle.used, before, loss,
+                            tuple(hunt.trace))
+
+    def _hunt(self, graph: MultiTierGraph, edits: int, oracle: Oracle,
               rng: np.random.Generator) -> AttackResult:
-        deadline = (time.monotonic() + self.config.deadline_ms / 1e3
-                    if self.config.deadline_ms else math.inf)
-        oracle = Oracle(ask, queries, deadline)
+        queries = oracle.budget
         try:
             hunt = Hunt.begin(graph, edits, oracle)
         except OracleSilentError:
             return AttackResult(graph, graph, 'skipped', 'no answer', edits, queries, oracle.used)
+        except BudgetError:
+            return AttackResult(graph, graph, 'skipped', oracle.exhausted, edits, queries)
         before = hunt.loss
+        self._under_way = hunt, before
         try:
             reason = self._search.hunt(hunt, rng)
         except OracleSilentError:

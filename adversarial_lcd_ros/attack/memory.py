@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from adversarial_lcd_ros.attack.deadline import check_time
 from adversarial_lcd_ros.compiled.hamming import lanes, mutual
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database
@@ -16,6 +17,8 @@ from adversarial_lcd_ros.keyframes.database import Database
 MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76
 CACHED = 256
+MAX_OBJECTS = 256
+MAX_BYTES = 2 ** 32
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,9 @@ class Memory:
         self._lanes = lru_cache(CACHED)(lambda index: _feature_lanes(self._database[index]))
 
     def add(self, graph: MultiTierGraph) -> None:
-        """Remember a graph as it was forwarded."""
-        self._database.add(graph)
+        """Remember a graph as it was forwarded, while there is room."""
+        if self._database.memory < MAX_BYTES:
+            self._database.add(graph)
 
     def too_young(self, stamp_ns: int) -> None:
         """Learn that at this time the detector compared with nothing, not even the oldest."""
@@ -73,6 +77,7 @@ class Memory:
 
     def echo(self, graph: MultiTierGraph, index: int) -> Echo:
         """Return which edges of a past graph the present one might repeat."""
+        check_time()
         past = self._database[index]
         # For each node of the past graph: the present one that looks like it, and how much.
         node = np.full(past.node_count, -1, np.int64)
@@ -95,7 +100,8 @@ def _feature_lanes(graph: MultiTierGraph) -> NDArray[np.uint64]:
 def _match_objects(graph: MultiTierGraph, past: MultiTierGraph, node: NDArray[np.int64],
                    alike: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return objects of one class in both graphs, those together that hold like features."""
-    objects, olds = graph.object_count, past.object_count
+    # No builder makes more; the time grows with the cube of their number.
+    objects, olds = (min(each.object_count, MAX_OBJECTS) for each in (graph, past))
     source, target = past.edge.astype(np.int64).T
     held = (source < olds) & (node[target] >= 0)
     holds = np.zeros((graph.node_count, olds))

@@ -19,6 +19,7 @@ Answer = LcdAnswer | float | bool
 Ask = Callable[[MultiTierGraph], Answer]
 HARD_LOGIT = 1.0
 MAX_LOGIT = 700.0
+DEADLINE = 'deadline'
 
 
 class OracleSilentError(AdversarialLcdError):
@@ -100,7 +101,7 @@ class Oracle:
         if self.used >= self.budget:
             return 'query budget spent'
         if time.monotonic() >= self.deadline_s:
-            return 'deadline'
+            return DEADLINE
         return ''
 
     def __call__(self, graph: MultiTierGraph) -> LcdAnswer:

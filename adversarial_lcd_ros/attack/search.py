@@ -38,6 +38,8 @@ class Hunt:
         The detector changes its decision on ``best``.
     trace : list of float
         Largest loss after each query.
+    kept : (MultiTierGraph, float, bool), optional
+        What ``keep`` was last given, in one piece: for another thread.
 
     """
 
@@ -50,6 +52,7 @@ class Hunt:
     hopeless: bool = False
     succeeded: bool = False
     trace: list[float] = field(default_factory=list)
+    kept: tuple[MultiTierGraph, float, bool] | None = None
 
     @classmethod
     def begin(cls, graph: MultiTierGraph, edit_budget: int, oracle: Oracle) -> Hunt:
@@ -77,7 +80,7 @@ class Hunt:
 
     def keep(self, graph: MultiTierGraph, loss: float, succeeded: bool) -> None:
         """Make a graph the best so far."""
-        self.best, self.loss, self.succeeded = graph, loss, succeeded
+        self.best, self.loss, self.succeeded = self.kept = graph, loss, succeeded
 
 
 class Search(Shown, ABC):

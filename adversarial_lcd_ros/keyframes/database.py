@@ -41,6 +41,7 @@ class Database:
 
     def __init__(self) -> None:
         self._graphs: list[MultiTierGraph] = []
+        self._graph_bytes = 0
         self._stamp_ns: NDArray[np.int64] = np.zeros(0, np.int64)
         self._blocks: list[Block] = []
         self._threads = ThreadPoolExecutor(min(4, os.cpu_count() or 1), 'retrieval')
@@ -62,6 +63,11 @@ class Database:
         return (self._stamp_ns.nbytes + self._word.nbytes + self._number.nbytes
                 + sum(block.nbytes for block in self._blocks))
 
+    @property
+    def memory(self) -> int:
+        """Bytes taken, those of the graphs' arrays included."""
+        return self.nbytes + self._graph_bytes
+
     def add(self, graph: MultiTierGraph) -> None:
         """Store a graph as the newest keyframe."""
         index = len(self._graphs)
@@ -73,6 +79,7 @@ class Database:
                              graph.word_weight)
         self._stamp_ns[index] = graph.stamp_ns
         self._graphs.append(graph)
+        self._graph_bytes += graph.nbytes
 
     def _number_new(self, word: NDArray[np.uint32]) -> None:
         new = word[~self._is_known(word)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database
-from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.scoring import Compared, Judge
 from adversarial_lcd_ros.lcd.views import View
 
@@ -89,15 +90,23 @@ class LoopClosureDetector:
 
     def remember(self, graph: MultiTierGraph) -> None:
         """Store a graph as a keyframe without judging it, while there is room."""
-        if len(self._database) < self.config.max_keyframes:
+        if self.has_room:
             self._database.add(graph)
+
+    @property
+    def has_room(self) -> bool:
+        """Whether a further graph would be remembered."""
+        return (len(self._database) < self.config.max_keyframes
+                and self._database.memory < self.config.max_keyframe_mb * 2 ** 20)
 
     def answer(self, query: LcdQuery) -> LcdAnswer:
         """Tell what the decision on a graph would be; remembers nothing."""
         decision = self.judge(query.graph)
         soft = not self.config.hard_answers
-        return LcdAnswer(query.id, decision.is_loop, soft,
-                         decision.probability if soft else float(decision.is_loop))
+        if not soft:
+            return LcdAnswer(query.id, decision.is_loop, soft, float(decision.is_loop))
+        return LcdAnswer(query.id, decision.is_loop, soft, decision.probability,
+                         decision.log_odds)
 
     def judge(self, graph: MultiTierGraph) -> LoopClosure:
         """Decide whether a graph closes a loop with a keyframe; remembers nothing."""
@@ -107,14 +116,17 @@ class LoopClosureDetector:
                                is_loop=False, probability=0.0)
         logit = self.log_odds(graph)
         best = int(logit.argmax())
+        log_odds = float(logit[best])
         match = self._database[nodes.candidates[best]]
-        is_loop, chance = self.judging.verdict(float(logit[best]),
-                                               lambda: self.support(graph, best))
+        is_loop, chance = self.judging.verdict(log_odds, lambda: self.support(graph, best))
+        if chance != probability(log_odds):  # what a check has lowered
+            log_odds = math.nan
         return LoopClosure(
             graph.stamp_ns, graph.frame_id, graph.sequence,
             is_loop=is_loop, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
-            vbow_score=nodes.bow[best], candidates=len(nodes.candidates))
+            vbow_score=nodes.bow[best], candidates=len(nodes.candidates), log_odds=log_odds,
+            match_session=match.session)
 
     def support(self, graph: MultiTierGraph, candidate: int) -> float:
         """Return how far a loop with a candidate is borne out; flips of edges do not change it."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import wait
 from dataclasses import replace
 import sys
 from threading import Condition, Thread
 import time
-import traceback
 from typing import Any
 
 from rclpy.publisher import Publisher
@@ -17,16 +17,21 @@ from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
+from adversarial_lcd_ros.attack.oracle import DEADLINE
 from adversarial_lcd_ros.errors import CodecError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.compiled import load_for_attacker
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.oracle import TopicOracle
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.nodes.sideline import Sideline
+from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 INPUT, OUTPUT = 'graph_clean', 'graph'
+# A search that looks at the clock ends by itself soon after the deadline.
+_GRACE_S = 0.002
 
 
 class AttackerNode(PipelineNode):
@@ -50,11 +55,12 @@ class AttackerNode(PipelineNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        config, self._node_config = self.settings
+        self._config, self._node_config, self._limits = self.settings
         self._refuse_loop()
-        self._attacker = Attacker(config)
-        load_for_attacker(config)
+        self._attacker = Attacker(self._config)
+        load_for_attacker(self._config)
         self._oracle = TopicOracle(self, self.diagnostics, self._node_config.query_timeout_s)
+        self._watch = GraphWatch(self.diagnostics)
         self._reports = create_payload_publisher(self, 'attack_report')
         self._output: Publisher | None = None
         self._waiting: deque[tuple[bytes, float]] = deque()
@@ -63,10 +69,14 @@ class AttackerNode(PipelineNode):
         self._closing = False
         self.diagnostics.waiting_for = f'a publisher of {self.resolve_topic_name(INPUT)}'
         self.diagnostics.gauges['waiting graphs'] = lambda: len(self._waiting)
+        self._search = Sideline('search') if self._config.deadline_ms else None
+        self._forward_guarded = self.diagnostics.guard('graph', self._forward)
         self._worker = Thread(target=self._run, name='attack', daemon=True)
         self._worker.start()
-        self._input = MirroredSubscription(
-            self, UInt8MultiArray, INPUT, self._on_graph, raw=True, prepare=self._open_output)
+        self._input = MirroredSubscription(self, UInt8MultiArray, INPUT, 'graph', self._on_graph,
+                                           raw=True, prepare=self._open_output)
+        self.say_ready(f'mode {self._config.mode}, {self._config.perturbation}, deadline '
+                       f'{self._config.deadline_ms:g} ms', OUTPUT)
 
     def _refuse_loop(self) -> None:
         topic = self.resolve_topic_name(INPUT)
@@ -91,7 +101,7 @@ class AttackerNode(PipelineNode):
     def _on_graph(self, wire: bytes) -> None:
         self.diagnostics.count('received graphs')
         with self._arrived:
-            self._waiting.append((wire, time.perf_counter()))
+            self._waiting.append((wire, time.monotonic()))
             if len(self._waiting) > self._node_config.max_backlog:
                 self._catching_up = True
                 self._oracle.interrupt()
@@ -107,40 +117,64 @@ class AttackerNode(PipelineNode):
                 if not self._waiting:
                     return
                 wire, arrival_s = self._waiting.popleft()
-            self._forward(wire, arrival_s)
+            self._forward_guarded(wire, arrival_s)
 
     def _forward(self, wire: bytes, arrival_s: float) -> None:
         """Publish what becomes of one message: attacked, or byte for byte as it came."""
         result, forwarded = None, wire
         try:
-            result = self._attack(codec.decode_graph(unwrap(wire)))
+            graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
+            self._watch.note(graph)
+            result = self._attack(graph, arrival_s)
             if len(result.flips):
                 forwarded = wrap(codec.encode_graph(result.perturbed))
         except CodecError as error:
             # Dropping what it cannot read would give the man in the middle away.
-            self.diagnostics.count('forwarded unread')
-            self.get_logger().warning(f'graph forwarded unread: {error}',
-                                      throttle_duration_sec=5.0)
+            self.diagnostics.worry('forwarded unread', f'graph forwarded unread: {error}',
+                                   said_as=error.cause)
+            self.diagnostics.count(f'forwarded unread: {error.cause}')
         except Exception:
             # The worker outlives a defect of an attack: graphs must go on flowing.
             self.diagnostics.count('failed attacks')
-            self.get_logger().error(f'attack failed, graph forwarded unchanged:\n'
-                                    f'{traceback.format_exc()}')
+            self.diagnostics.defect('attack')
+        self._publish(forwarded, result, arrival_s)
+
+    def _publish(self, forwarded: bytes, result: AttackResult | None, arrival_s: float) -> None:
         assert self._output is not None
         self._output.publish(forwarded)
-        duration_s = time.perf_counter() - arrival_s
+        duration_s = time.monotonic() - arrival_s
         self.diagnostics.count('published graphs')
         self.diagnostics.time(duration_s)
         if result is not None:
             self._report(result, duration_s)
 
-    def _attack(self, graph: MultiTierGraph) -> AttackResult:
+    def _attack(self, graph: MultiTierGraph, arrival_s: float) -> AttackResult:
         if self._catching_up or self._closing:
             reason = 'closing' if self._closing else 'backlog'
             return AttackResult(graph, graph, 'skipped', reason)
-        result = self._attacker.process(graph, self._oracle.ask)
+        result = (self._attacker.process(graph, self._oracle.ask) if self._search is None else
+                  self._attack_until(graph, arrival_s + self._config.deadline_ms / 1e3))
         if self._catching_up and result.reason == 'no answer':
             return replace(result, reason='backlog')
+        return result
+
+    def _attack_until(self, graph: MultiTierGraph, deadline_s: float) -> AttackResult:
+        """Attack a graph in another thread; take what there is at the deadline."""
+        assert self._search is not None
+
+        def attack() -> AttackResult:
+            self._oracle.end_at(deadline_s)
+            return self._attacker.attack(graph, self._oracle.ask, deadline_s)
+
+        found = self._search.do(attack)
+        wait([found], max(0.0, deadline_s + _GRACE_S - time.monotonic()))
+        if found.done():
+            result = found.result()
+        else:
+            self.diagnostics.count('searches cut off')
+            result = (AttackResult(graph, graph, 'skipped', DEADLINE) if found.cancel()
+                      else self._attacker.so_far(graph))
+        self._search.do(lambda: self._attacker.observe(result.perturbed))
         return result
 
     def _report(self, result: AttackResult, duration_s: float) -> None:
@@ -159,6 +193,8 @@ class AttackerNode(PipelineNode):
             self._oracle.interrupt()
             self._arrived.notify()
         self._worker.join()
+        if self._search is not None:
+            self._search.close()
 
     def destroy_node(self) -> None:
         """Stop the worker before its publishers go."""

@@ -16,10 +16,11 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.errors import CodecError, ConfigError, EvaluationError, SequenceError
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
+from adversarial_lcd_ros.nodes.streams import SessionWatch
 from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
@@ -27,9 +28,12 @@ from adversarial_lcd_ros.settings import NODE_CONFIGS
 GRAPHS = CLEAN, _ = 'graph_clean', 'graph'
 DECISIONS, REPORTS = 'loop_closures', 'attack_report'
 RECORDED = (*GRAPHS, DECISIONS, REPORTS)
+_NOUNS = dict.fromkeys(GRAPHS, 'graph') | {DECISIONS: 'loop closure', REPORTS: 'report'}
 _DEPTH = 10
 _CLOCK_PERIOD_S = 0.025
 _SPIN_S = 0.1
+# A gap that looks like a replay which hangs.
+_LONG_S = 10.0
 # The other ends have matched as seen from here; this is for them to see it too, and each other.
 # A quarter of a second was too short once on a busy machine: the first graph was lost.
 _SETTLE_S = 1.0
@@ -64,14 +68,17 @@ class BagReplayNode(PipelineNode):
                               if self._config.clock else None)
         self._recorder = BagRecorder(Path(node_config.record)) if node_config.record else None
         self._inputs = {
-            topic: MirroredSubscription(self, UInt8MultiArray, topic, self._handler(topic),
-                                        raw=True)
+            topic: MirroredSubscription(self, UInt8MultiArray, topic, _NOUNS[topic],
+                                        self._handler(topic), raw=True)
             for topic in (RECORDED if self._recorder else (DECISIONS,))}
+        self._broken: Exception | None = None
+        self._restarts = SessionWatch(self.diagnostics, 'lcd', 'its keyframes are gone')
         self._under_way: dict[int, float] = {}
         self._published = self._decided = self._time_ns = 0
         self._origin: tuple[float, int] | None = None
         self._clock_due_s = 0.0
         self._spin: Callable[[float], bool] = lambda seconds: False
+        self.say_ready(f'{self._replay.frame_count} frames of {node_config.bag}')
 
     def _open(self, topic: str, message_type: str) -> Publisher:
         package, _, name = message_type.partition('/msg/')
@@ -85,20 +92,28 @@ class BagReplayNode(PipelineNode):
     def _handler(self, topic: str) -> Callable[[bytes], None]:
         def on_message(wire: bytes) -> None:
             self.diagnostics.count(f'received {topic}')
-            if self._recorder:
-                self._recorder.write(topic, WIRE_TYPE, self._time_ns, wire)
+            self._record(topic, wire)
             if topic == DECISIONS:
                 self._on_decision(wire)
         return on_message
 
-    def _on_decision(self, wire: bytes) -> None:
-        try:
-            decision = codec.decode_loop_closure(unwrap(wire))
-        except CodecError as error:
-            self.diagnostics.refuse('loop closure', error)
+    def _record(self, topic: str, wire: bytes) -> None:
+        if self._recorder is None or self._broken is not None:
             return
+        try:
+            self._recorder.write(topic, WIRE_TYPE, self._time_ns, wire)
+        except Exception as error:
+            # Callbacks survive anything; a recording with holes must not.
+            self._broken = error
+
+    def _on_decision(self, wire: bytes) -> None:
+        decision = codec.decode_loop_closure(unwrap(wire))
+        self._restarts.note(decision.session)
         published_s = self._under_way.pop(decision.stamp_ns, None)
-        if published_s is not None:
+        if published_s is None:
+            self.diagnostics.worry('decisions not asked for', 'a decision on a frame that was not '
+                                   'published here, or decided twice')
+        else:
             self._decided += 1
             self.diagnostics.time(time.monotonic() - published_s)
 
@@ -143,6 +158,8 @@ class BagReplayNode(PipelineNode):
     def _turn(self, seconds: float) -> None:
         if not self._spin(seconds):
             raise Stopped
+        if self._broken is not None:
+            raise self._broken
 
     def _until(self, condition: Callable[[], bool]) -> bool:
         """Run callbacks until the condition holds; False after timeout_s."""
@@ -204,6 +221,10 @@ class BagReplayNode(PipelineNode):
             self._origin = time.monotonic(), stamp_ns
         origin_s, origin_ns = self._origin
         due_s = origin_s + (stamp_ns - origin_ns) * 1e-9 / self._config.rate
+        if due_s - time.monotonic() > _LONG_S:
+            self.diagnostics.worry(
+                'stamps that jumped', f'the next message, with stamp {stamp_ns} ns, is due in '
+                f'{due_s - time.monotonic():.0f} s; start_s leaves out what is before it')
         while (now_s := time.monotonic()) < due_s:
             if now_s >= self._clock_due_s:
                 self._tell_time(origin_ns + round((now_s - origin_s) * 1e9 * self._config.rate))

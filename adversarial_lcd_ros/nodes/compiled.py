@@ -51,10 +51,12 @@ def _graph(stamp_ns: int) -> MultiTierGraph:
     edge = edge[np.lexsort((edge[:, 1], edge[:, 0]))].astype(np.uint32)
     descriptor = np.zeros((_NODES, 32), np.uint8)
     descriptor[_OBJECTS:] = np.random.default_rng(0).integers(0, 256, (len(feature), 32))
+    position = np.stack([np.arange(_NODES)] * 2, axis=1).astype(np.float32)
+    offset = position[edge[:, 0]] - position[edge[:, 1]]
     return codec.decode_graph(codec.encode_graph(MultiTierGraph(
         stamp_ns=stamp_ns, frame_id='', sequence=0, width=640, height=480,
         tier=(np.arange(_NODES) >= _OBJECTS).astype(np.uint8), label=np.zeros(_NODES, np.uint32),
-        position=np.stack([np.arange(_NODES) / _NODES] * 2, axis=1).astype(np.float32),
+        position=position,
         size=np.ones((_NODES, 2), np.float32), score=np.ones(_NODES, np.float32),
-        descriptor=descriptor, edge=edge, edge_length=np.zeros(len(edge), np.float32),
+        descriptor=descriptor, edge=edge, edge_length=np.hypot(*offset.T) / np.float32(800),
         word=np.zeros(1, np.uint32), word_weight=np.ones(1, np.float32))))

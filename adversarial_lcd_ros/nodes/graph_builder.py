@@ -17,8 +17,8 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header, UInt8MultiArray
 
+from adversarial_lcd_ros.checks import checked_name, checked_stamp_ns
 from adversarial_lcd_ros.codec import decode_detections, encode_graph
-from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
@@ -27,6 +27,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
 )
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.nodes.streams import StampWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
@@ -37,7 +38,6 @@ from adversarial_lcd_ros.vision.objects import Detections
 IMAGE, COMPRESSED, DETECTIONS = 'image', 'image/compressed', 'detections'
 _REMEMBERED_STAMPS = 64
 _LOOK_PERIOD_S = 0.01
-_WARNING_PERIOD_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class GraphBuilderNode(PipelineNode):
     manual = Manual(
         'camera frames to multi-tier graphs of objects and visual features',
         subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',
-                    f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG or PNG)',
+                    f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG, PNG or WebP)',
                     f'{DETECTIONS} (std_msgs/UInt8MultiArray, Detections): the objects of each '
                     'frame, under detector:=topic'),
         publishes=('graph (std_msgs/UInt8MultiArray, MultiTierGraph): one for each frame',
@@ -66,92 +66,86 @@ class GraphBuilderNode(PipelineNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        config, node_config = self.settings
+        config, node_config, self._limits = self.settings
         self._builder = GraphBuilder(config, node_config.frames_at_once)
         self._frames_at_once = node_config.frames_at_once
         self._under_way: deque[_Frame] = deque()
         # Publishes in this node's own thread what a thread of the network has finished.
-        self._ready = self.create_guard_condition(self._publish_ready)
+        self._publish_guarded = self.diagnostics.guard('frame', self._publish)
+        self._ready = self.create_guard_condition(
+            self.diagnostics.guard('frame', self._publish_ready))
         self._sequence = 0
         self._graphs = create_payload_publisher(self, 'graph')
         self._overlays = self.create_publisher(Image, 'overlay', qos_profile_sensor_data)
         self._inputs = {
             topic: MirroredSubscription(
-                self, message, topic, partial(self._on_frame, topic, pixels),
+                self, message, topic, 'frame', partial(self._on_frame, topic, pixels),
                 depth=node_config.queue_depth)
             for topic, message, pixels in ((IMAGE, Image, image_pixels),
                                            (COMPRESSED, CompressedImage, compressed_pixels))}
         self._stamps: dict[str, deque[int]] = {
             topic: deque(maxlen=_REMEMBERED_STAMPS) for topic in self._inputs}
+        self._watches = {topic: StampWatch(self.diagnostics, f'frames on {topic}')
+                         for topic in self._inputs}
         self._last_number: dict[str, int] = {}
         self._inbox = (self._open_inbox(config, node_config) if config.detector == 'topic'
                        else None)
+        self.say_ready(f'{config.features} features, detector {config.detector}')
 
     def _open_inbox(self, config: Any, node_config: Any) -> DetectionInbox:
         """Take the objects of frames from a topic; these frames wait for them."""
         inbox = DetectionInbox(
             round(config.detections_tolerance_s * 1e9), node_config.detections_wait_ms / 1e3,
             node_config.queue_depth, self._count_detections)
-        self._detections = MirroredSubscription(self, UInt8MultiArray, DETECTIONS,
-                                                self._on_detections, raw=True)
+        self._detections = MirroredSubscription(
+            self, UInt8MultiArray, DETECTIONS, 'detections', self._on_detections, raw=True)
         self._expiry = steady_timer(self, _LOOK_PERIOD_S,
                                     lambda: inbox.expire(time.perf_counter()))
         return inbox
 
     def _on_detections(self, wire: bytes) -> None:
         self.diagnostics.count('received detections')
-        try:
-            found = decode_detections(unwrap(wire))
-        except AdversarialLcdError as error:
-            self.diagnostics.refuse('detections', error)
-            return
+        found = decode_detections(unwrap(wire, self._limits.max_payload_bytes), self._limits)
         if self._inbox:
             self._inbox.offer(found.stamp_ns, Detections(found.label, found.box, found.score))
 
     def _count_detections(self, what: str) -> None:
-        self.diagnostics.count(what)
         remedy = ('their graphs have no objects; set detections_wait_ms or '
                   'detections_tolerance_s' if what == MISSED
                   else 'late, or of frames that never came')
-        self.get_logger().warning(f'{what}: {self.diagnostics[what]} so far ({remedy})',
-                                  throttle_duration_sec=_WARNING_PERIOD_S)
+        self.diagnostics.worry(what, f'{what}: {remedy}')
 
-    def _on_frame(self, topic: str, pixels: Callable[[Any], NDArray[np.uint8]], message: Any,
+    def _on_frame(self, topic: str, pixels: Callable[[Any, int], NDArray[np.uint8]], message: Any,
                   info: Mapping[str, Any]) -> None:
         arrival_s = time.perf_counter()
         self.diagnostics.count('received frames')
         self._count_lost(topic, info['publication_sequence_number'])
         stamp = message.header.stamp
-        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
-        if self._is_repeat(topic, stamp_ns):
+        if self._is_repeat(topic, stamp.sec * 1_000_000_000 + stamp.nanosec):
             return
+        # Of a frame that is refused the numbers of the graphs tell that it is missing.
         sequence, self._sequence = self._sequence, self._sequence + 1
-        try:
-            image = pixels(message)
-            frame = (image, stamp_ns, message.header.frame_id, sequence)
-            building = (self._builder.begin(*frame) if self._inbox is None else
-                        self._builder.begin(*frame, self._inbox.expect(stamp_ns, arrival_s)))
-        except AdversarialLcdError as error:
-            self.diagnostics.refuse('frame', error)
-            return
+        stamp_ns = checked_stamp_ns(stamp.sec, stamp.nanosec)
+        frame_id = checked_name(message.header.frame_id, 'frame_id')
+        self._watches[topic].note_stamp(stamp_ns)
+        image = pixels(message, self._limits.max_pixels)
+        frame = (image, stamp_ns, frame_id, sequence)
+        building = (self._builder.begin(*frame) if self._inbox is None else
+                    self._builder.begin(*frame, self._inbox.expect(stamp_ns, arrival_s)))
         self._under_way.append(_Frame(building, message.header, image, arrival_s))
         building.when_ready(self._ready.trigger)
         # Frames that wait for a message must not be waited for: it comes in this thread.
         while self._inbox is None and len(self._under_way) > self._frames_at_once:
-            self._publish(self._under_way.popleft())
+            self._publish_guarded(self._under_way.popleft())
 
     def _publish_ready(self) -> None:
         while self._under_way and self._under_way[0].building.ready():
-            self._publish(self._under_way.popleft())
+            self._publish_guarded(self._under_way.popleft())
 
     def _publish(self, frame: _Frame) -> None:
         """Publish a graph; waits for it if need be."""
-        try:
-            graph = frame.building.graph()
-        except AdversarialLcdError as error:
-            self.diagnostics.refuse('frame', error)
-            return
-        self._graphs.publish(wrap(encode_graph(graph)))
+        graph = frame.building.graph()
+        self._graphs.publish(wrap(encode_graph(graph, self.session)))
         self.diagnostics.count('published graphs')
         self.diagnostics.time(time.perf_counter() - frame.arrival_s)
         if self._overlays.get_subscription_count():
@@ -172,7 +166,8 @@ class GraphBuilderNode(PipelineNode):
         last = self._last_number.get(topic, number)
         self._last_number[topic] = number
         if number > last + 1 and self.count_publishers(topic) == 1:
-            self.diagnostics.count('lost frames', number - last - 1)
+            self.diagnostics.worry('lost frames', f'{topic}: frames gave way to newer ones in '
+                                   'the queue', number - last - 1)
 
     def _publish_overlay(self, header: Header, image: NDArray[np.uint8],
                          graph: MultiTierGraph) -> None:
@@ -186,7 +181,7 @@ class GraphBuilderNode(PipelineNode):
         if self._inbox:
             self._inbox.close()
         while self._under_way:
-            self._publish(self._under_way.popleft())
+            self._publish_guarded(self._under_way.popleft())
         self._builder.close()
 
 

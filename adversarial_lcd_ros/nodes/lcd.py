@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import sys
 import time
 from typing import Any
@@ -10,15 +11,17 @@ from typing import Any
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.nodes.compiled import load_for_detector
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
+    overridable,
     payload_qos,
 )
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
+from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
@@ -38,38 +41,72 @@ class LcdNode(PipelineNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.detector = LoopClosureDetector(self.settings[0])
-        load_for_detector(self.settings[0])
+        config, node_config, self._limits = self.settings
+        self.detector = LoopClosureDetector(config)
+        load_for_detector(config)
+        self._rate = Rate(node_config.max_queries_per_s)
+        self._watch = GraphWatch(self.diagnostics)
         self._decisions = create_payload_publisher(self, 'loop_closures')
         self._answers = create_payload_publisher(self, 'answer')
         self._graphs = MirroredSubscription(
-            self, UInt8MultiArray, 'graph', self._on_graph, raw=True)
+            self, UInt8MultiArray, 'graph', 'graph', self._on_graph, raw=True)
         self._queries = self.create_subscription(
-            UInt8MultiArray, 'query', self._on_query, payload_qos(), raw=True)
+            UInt8MultiArray, 'query', self.diagnostics.guard('query', self._on_query),
+            payload_qos(), raw=True, qos_overriding_options=overridable())
         self.diagnostics.gauges['keyframes'] = lambda: self.detector.keyframe_count
+        self.diagnostics.problems.append(lambda: '' if self.detector.has_room else
+                                         'no room for further keyframes')
+        self.say_ready(f'target {config.target}, threshold {config.threshold:g}, answers '
+                       f'{"hard" if config.hard_answers else "soft"}, geometric check '
+                       f'{"on" if config.geometric_check else "off"}')
 
     def _on_graph(self, wire: bytes) -> None:
         arrival_s = time.perf_counter()
         self.diagnostics.count('received graphs')
-        try:
-            decision = self.detector.detect(codec.decode_graph(unwrap(wire)))
-        except AdversarialLcdError as error:
-            self.diagnostics.refuse('graph', error)
-            return
+        graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
+        self._watch.note(graph)
+        decision = replace(self.detector.detect(graph), session=self.session)
         self._decisions.publish(wrap(codec.encode_loop_closure(decision)))
         self.diagnostics.count('published loop closures')
         self.diagnostics.count('loops declared', int(decision.is_loop))
         self.diagnostics.time(time.perf_counter() - arrival_s)
 
     def _on_query(self, wire: bytes) -> None:
+        # Decisions first: however many queries wait, a graph waits for one of them at most.
+        self._graphs.take_waiting()
         self.diagnostics.count('received queries')
-        try:
-            answer = self.detector.answer(codec.decode_query(unwrap(wire)))
-        except AdversarialLcdError as error:
-            self.diagnostics.refuse('query', error)
-            return
+        self._rate.take()
+        query = codec.decode_query(unwrap(wire, self._limits.max_payload_bytes), self._limits)
+        answer = replace(self.detector.answer(query), session=self.session)
         self._answers.publish(wrap(codec.encode_answer(answer)))
         self.diagnostics.count('published answers')
+
+
+class Rate:
+    """
+    So many things a second, those of a second at once.
+
+    Parameters
+    ----------
+    per_s : int
+
+    """
+
+    def __init__(self, per_s: int) -> None:
+        self._per_s = per_s
+        self._left = float(per_s)
+        self._last_s = time.monotonic()
+
+    def take(self) -> None:
+        """Count one; raises CodecError where it is one too many."""
+        now_s = time.monotonic()
+        self._left = min(float(self._per_s),
+                         self._left + (now_s - self._last_s) * self._per_s)
+        self._last_s = now_s
+        if self._left < 1:
+            raise CodecError(f'more than {self._per_s} a second (parameter max_queries_per_s)',
+                             cause='rate')
+        self._left -= 1
 
 
 def main(args: Sequence[str] | None = None) -> int:

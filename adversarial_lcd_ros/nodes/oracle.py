@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 from threading import Condition
 import time
@@ -12,13 +13,19 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.oracle import OracleSilentError
 from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery
-from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
-from adversarial_lcd_ros.nodes.endpoints import create_payload_publisher, payload_qos
+from adversarial_lcd_ros.nodes.endpoints import (
+    create_payload_publisher,
+    overridable,
+    payload_qos,
+)
+from adversarial_lcd_ros.nodes.streams import SessionWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
 
 _LOOK_S = 0.01
+_UNANSWERED = 3
 
 
 class TopicOracle:
@@ -43,12 +50,16 @@ class TopicOracle:
         self._changed = Condition()
         self._answer: LcdAnswer | None = None
         self._interrupted = False
+        self._deadline_s = math.inf
         self._was_silent = False
+        self._unanswered = 0
         # A random start: attackers that share a detector see each other's answers.
         self._id = secrets.randbits(62)
         self._queries = create_payload_publisher(node, 'query')
+        self._restarts = SessionWatch(diagnostics, 'lcd', 'its keyframes are gone')
         self._answers = node.create_subscription(
-            UInt8MultiArray, 'answer', self._on_answer, payload_qos(), raw=True)
+            UInt8MultiArray, 'answer', diagnostics.guard('answer', self._on_answer),
+            payload_qos(), raw=True, qos_overriding_options=overridable())
 
     def ask(self, graph: MultiTierGraph) -> LcdAnswer:
         """
@@ -60,7 +71,7 @@ class TopicOracle:
             No answer within the timeout, or ``interrupt`` was called.
 
         """
-        deadline_s = time.monotonic() + self._timeout_s
+        deadline_s = min(time.monotonic() + self._timeout_s, self._deadline_s)
         self._await_listener(deadline_s)
         with self._changed:
             self._id += 1
@@ -76,6 +87,10 @@ class TopicOracle:
             if self._interrupted:
                 raise OracleSilentError('the query was interrupted')
         raise self._silence('no answer to a query')
+
+    def end_at(self, deadline_s: float) -> None:
+        """Wait for no answer beyond a time, as ``time.monotonic()`` tells it; inf: none."""
+        self._deadline_s = deadline_s
 
     def interrupt(self, interrupted: bool = True) -> None:
         """Make the query under way and all later ones fail, or allow them again."""
@@ -94,18 +109,24 @@ class TopicOracle:
                     raise self._silence('nobody listens to queries')
                 self._changed.wait(_LOOK_S)
 
-    def _silence(self, what: str) -> OracleSilentError:
+    def _silence(self, what: str) -> AdversarialLcdError:
+        """Return what ends the attack: the deadline, or a detector that says nothing."""
+        self._unanswered += 1
+        # The deadline often falls into a query; over several it has not even answered late.
+        if (time.monotonic() >= self._deadline_s and self._unanswered < _UNANSWERED
+                and self._queries.get_subscription_count()):
+            return BudgetError(f'{what} before the deadline')
         self._was_silent = True
-        self._diagnostics.count('queries without answer')
-        return OracleSilentError(f'{what} within {self._timeout_s:g} s: is lcd running, and are '
-                                 'query and answer remapped alike on both sides?')
+        error = OracleSilentError(f'{what} within {self._timeout_s:g} s or the deadline: is lcd '
+                                  'running, and are query and answer remapped alike on both '
+                                  'sides?')
+        self._diagnostics.worry('queries without answer', str(error))
+        return error
 
     def _on_answer(self, wire: bytes) -> None:
-        try:
-            answer = codec.decode_answer(unwrap(wire))
-        except CodecError as error:
-            self._diagnostics.refuse('answer', error)
-            return
+        answer = codec.decode_answer(unwrap(wire))
+        self._restarts.note(answer.session)
+        self._unanswered = 0
         with self._changed:
             if answer.id == self._id and self._answer is None:
                 self._answer = answer

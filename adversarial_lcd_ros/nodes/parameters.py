@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, fields
 import sys
 from typing import Any
@@ -17,6 +17,11 @@ from adversarial_lcd_ros.settings import limits
 # Declared by rclpy itself, on every node.
 _RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 _MAX_INTEGER = 2**63 - 1
+_OVERRIDES = 'qos_overrides.'
+_KINDS = ('publisher', 'subscription')
+_POLICIES: Mapping[str, tuple[str, ...]] = {
+    'history': ('keep_last', 'keep_all'), 'depth': (),
+    'reliability': ('reliable', 'best_effort'), 'durability': ('volatile', 'transient_local')}
 
 
 def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:
@@ -39,9 +44,10 @@ def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:
         An override is unknown, of the wrong type or out of range.
 
     """
-    given = {name: value for name, value in node.get_parameters_by_prefix('').items()
-             if name not in _RCLPY_PARAMETERS}
-    given = {name: getattr(value, 'value', value) for name, value in given.items()}
+    given = {name: getattr(value, 'value', value)
+             for name, value in node.get_parameters_by_prefix('').items()}
+    _check_rclpys({name: given.pop(name) for name in list(given)
+                   if name in _RCLPY_PARAMETERS or name.startswith(_OVERRIDES)})
     known = {entry.name for config in configs for entry in fields(config)}
     unknown = sorted(set(given) - known)
     if unknown:
@@ -58,6 +64,42 @@ def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:
             node.declare_parameter(entry.name, getattr(setting, entry.name), _descriptor(entry),
                                    ignore_override=True)
     return settings
+
+
+def _check_rclpys(given: Mapping[str, Any]) -> None:
+    """Refuse values of rclpy's own parameters that it would log and ignore."""
+    for name, value in given.items():
+        if name in _RCLPY_PARAMETERS:
+            if type(value) is not bool:
+                raise ConfigError(f'{name} = {value!r}: expected true or false')
+            continue
+        topic, kind, policy = (['', '', *name.removeprefix(_OVERRIDES).split('.')])[-3:]
+        if not topic or kind not in _KINDS or policy not in _POLICIES:
+            raise ConfigError(f'{name}: expected {_OVERRIDES}/TOPIC.KIND.POLICY, KIND one of '
+                              f'{", ".join(_KINDS)}, POLICY one of {", ".join(_POLICIES)}')
+        elif policy == 'depth' and (type(value) is not int or value < 1):
+            raise ConfigError(f'{name} = {value!r}: expected a whole number above 0')
+        elif policy != 'depth' and value not in _POLICIES[policy]:
+            raise ConfigError(f'{name} = {value!r}: expected one of '
+                              f'{", ".join(_POLICIES[policy])}')
+
+
+def check_overridden_topics(node: Node, **topics: Sequence[str]) -> None:
+    """
+    Refuse overrides of QoS for topics that the node does not have.
+
+    Parameters
+    ----------
+    node : Node
+    topics : sequence of str
+        Names by ``publisher`` and ``subscription``.
+
+    """
+    for name in node.get_parameters_by_prefix(_OVERRIDES.rstrip('.')):
+        topic, kind, _ = name.rsplit('.', 2)
+        if topic not in topics[kind]:
+            raise ConfigError(f'{_OVERRIDES}{name}: no {kind} of {topic} here; there are: '
+                              f'{", ".join(topics[kind])}')
 
 
 def _descriptor(entry: Field[Any]) -> ParameterDescriptor:

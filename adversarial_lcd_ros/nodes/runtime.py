@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import importlib
 import importlib.util
+import secrets
 import signal
 import sys
 from threading import Event
@@ -30,6 +31,7 @@ from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
 
 EXIT_OK, EXIT_ERROR, EXIT_USAGE = 0, 1, 2
 _SPIN_S = 0.1
+_OF_ROS = ('/rosout', '/parameter_events')
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError, rclpy_implementation.RCLInvalidROSArgsError,
@@ -57,6 +59,10 @@ class PipelineNode(Node):  # type: ignore[misc]
 
     Attributes
     ----------
+    session : int
+        Another one for each run: tells a restart to whoever reads its messages.
+    inputs : list of str
+        Topics that are subscribed to once they have a publisher.
     wakes_itself : bool
         It has guard conditions, and needs an executor that knows of them.
 
@@ -77,6 +83,33 @@ class PipelineNode(Node):  # type: ignore[misc]
                          **options)
         self.settings: list[Any] = parameters.declare(self, self.configs)
         self.diagnostics = Diagnostics(self, self.manual.purpose)
+        self.session = secrets.randbits(64) or 1
+        self.inputs: list[str] = []
+
+    def say_ready(self, about: str, *outputs: str) -> None:
+        """
+        Log what the node is and on which topics; see that QoS overrides are for some of them.
+
+        Parameters
+        ----------
+        about : str
+            The settings that tell most.
+        outputs : str
+            Topics that will have a publisher later.
+
+        """
+        heard = sorted({*self.inputs, *(entry.topic_name for entry in self.subscriptions)})
+        said = sorted({*map(self.resolve_topic_name, outputs),
+                       *(entry.topic_name for entry in self.publishers)} - set(_OF_ROS))
+        parameters.check_overridden_topics(self, subscription=heard, publisher=said)
+        self.get_logger().info(f'ready: {about}; hears {", ".join(heard)}; publishes '
+                               f'{", ".join(said)}')
+
+    def destroy_node(self) -> None:
+        """Log what was counted before the publishers go."""
+        if self.context.ok():
+            self.get_logger().info(f'end: {self.diagnostics.summary()}')
+        super().destroy_node()
 
     def work(self, spin: Callable[[float], bool]) -> int:
         """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+import math
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +172,7 @@ def inspect_payload(path: Path) -> tuple[str, Any]:
         raise CodecError(f'{path} cannot be read: {error.strerror}') from error
     if not name:
         raise CodecError(f'{path} is neither a bag nor a payload of '
-                         f'{", ".join(codec.MESSAGES)}')
+                         f'{", ".join(codec.MESSAGES)}{_nearly(path.read_bytes())}')
     return name, content
 
 
@@ -184,5 +185,18 @@ def payload_values(content: Any) -> dict[str, Any]:
                 'stamp_ns': content.stamp_ns, 'frame_id': content.frame_id}
     values = {entry.name: getattr(content, entry.name) for entry in fields(content)}
     return {name: payload_values(value) if isinstance(value, MultiTierGraph)
-            else value.tolist() if isinstance(value, np.ndarray) else value
+            else value.tolist() if isinstance(value, np.ndarray)
+            # JSON has no word for the log odds of certainty.
+            else None if value in (math.inf, -math.inf) else value
             for name, value in values.items()}
+
+
+def _nearly(data: bytes) -> str:
+    """Tell why the message was refused whose layout the data have, if they have one's."""
+    for name, decode in _DECODERS.items():
+        try:
+            decode(data)
+        except CodecError as error:
+            if error.cause not in (CodecError.cause, 'version', 'counts'):
+                return f'; read as {name}: {error}'
+    return ''

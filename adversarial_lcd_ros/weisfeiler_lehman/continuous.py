@@ -9,6 +9,7 @@ from scipy import sparse
 from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE, incidence
 from adversarial_lcd_ros.graph import FEATURE_TIER, MultiTierGraph
 from adversarial_lcd_ros.weisfeiler_lehman import flips
+from adversarial_lcd_ros.weisfeiler_lehman.pooled_flips import ITERATIONS, pooled_changes
 
 NODE_FEATURES = ('is_object', 'x', 'y', 'log_size', 'score', 'log_degree')
 
@@ -105,7 +106,8 @@ def flip_features(graph: MultiTierGraph, x: NDArray[np.float64], pairs: NDArray[
     levels = np.stack([x, *iterate(x, graph.weighted_adjacency(LENGTH_SCALE), iterations)])
     ends = np.ascontiguousarray(pairs, np.int64).reshape(-1, 2)
     gained = np.exp(-graph.length_between(ends).astype(np.float64) / LENGTH_SCALE)
-    change: NDArray[np.float64] = flips.changes(
-        ends, graph.has_edges(ends), gained, levels,
-        *incidence(graph.edge, graph.edge_length, graph.node_count), pooled)
+    around = incidence(graph.edge, graph.edge_length, graph.node_count)
+    change: NDArray[np.float64] = (
+        pooled_changes(ends, gained, levels, *around) if pooled and iterations == ITERATIONS else
+        flips.changes(ends, graph.has_edges(ends), gained, levels, *around, pooled))
     return graph.node_count * change if pooled else change

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import breadth_first_order
 
+from adversarial_lcd_ros.attack.deadline import check_time
 from adversarial_lcd_ros.attack.perturbations.base import Allowed, Perturbation
 from adversarial_lcd_ros.graph import MultiTierGraph
 
@@ -33,6 +34,7 @@ class ShortestPath(Perturbation):
         pairs = np.zeros((0, 2), np.int64)
         starts = np.flatnonzero(np.diff(graph.adjacency.indptr))
         for source in rng.permutation(starts)[:SOURCES]:
+            check_time()
             reached, before = breadth_first_order(graph.adjacency, source, directed=False)
             ends = rng.permutation(reached[1:])[:-(-2 * count // SOURCES)]
             drawn = [self._flip(int(source), int(end), before, rng) for end in ends]

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.deadline import check_time
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
 from adversarial_lcd_ros.attack.search import Hunt, Search
@@ -115,6 +116,7 @@ class Stepwise(Search):
     def _step(self, hunt: Hunt, pool: NDArray[np.int64], allowed: Allowed,
               learner: _Learner | None, x: NDArray[np.float64]) -> None:
         """Query flips of the pool, the most promising first, and commit the best."""
+        check_time()
         before = hunt.best
         features = (flip_features(before, x, pool, self._config.wl_iterations,
                                   pooled=self._config.wl_features == 'pooled') if learner
@@ -154,6 +156,7 @@ class Stepwise(Search):
                                           Allowed(self._config.edits), rng)
         if not len(pool):
             return graph
+        check_time()
         score = surrogate.predict(
             flip_features(graph, node_features(graph), pool, self._config.wl_iterations))
         return graph.flip(pool[np.argsort(-score, kind='stable')[:edit_budget]])
