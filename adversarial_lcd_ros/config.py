@@ -151,8 +151,9 @@ class BuilderConfig(Config):
         'detections (csv), or, in the node, the topic detections (topic).',
         choices=('onnx', 'none', 'csv', 'topic'))
     detections: str = setting(
-        '', 'Detector csv: file with the columns timestamp,class,x,y,w,h,score; empty: the '
-        'detections.csv of a sequence that has no images.')
+        '', 'Detector csv: file with the columns timestamp,class,x,y,w,h,score, or, in commands, '
+        "YOLO's folder of labels, named as the pictures; empty: the detections.csv of a sequence "
+        'that has no images.')
     detections_tolerance_s: float = setting(
         0.01, 'Detectors csv and topic: largest offset in time between a frame and its '
         'detections, seconds.', low=0.0, high=1e3)

@@ -68,10 +68,10 @@ def publish(ros, publisher, *messages):
 
 
 @pytest.mark.parametrize('padding', [0, 13])
-@pytest.mark.parametrize('encoding', ['bgr8', 'rgb8', 'mono8'])
+@pytest.mark.parametrize('encoding', ['bgr8', 'rgb8', 'bgra8', 'mono8'])
 def test_raw_frames_give_the_graph_of_the_core(ros, graphs, core, encoding, padding):
     bgr = picture()
-    pixels = {'bgr8': bgr, 'rgb8': bgr[:, :, ::-1],
+    pixels = {'bgr8': bgr, 'rgb8': bgr[:, :, ::-1], 'bgra8': np.dstack([bgr, bgr[:, :, :1]]),
               'mono8': cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)}[encoding]
     publish(ros, ros.publisher('image', Image), image_message(pixels, encoding, padding=padding))
     ros.until(lambda: graphs)
@@ -134,7 +134,7 @@ def test_graphs_leave_in_the_order_of_their_frames(ros, node, graphs, core, monk
 
 def bad_frames():
     good = image_message(picture())
-    yield 'encoding', image_message(picture(), 'bayer_rggb8')
+    yield 'encoding', image_message(picture(), '32FC1')
     yield 'no pixels', Image(encoding='bgr8')
     yield 'data cut', Image(height=120, width=160, step=480, encoding='bgr8', data=good.data[:-1])
     yield 'step too small', Image(height=120, width=160, step=479, encoding='bgr8',

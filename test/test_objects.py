@@ -146,9 +146,9 @@ def test_yolo_gets_rgb_from_0_to_1_with_grey_around(onnx_model):
             <int64[4] begin = {{0,0,{row},{column}}},
              int64[4] end = {{1,1,{row + 1},{column + 1}}},
              float[1,1,5] box = {{4.0, 8.0, 12.0, 12.0, 0.9}}, float levels = {{255.0}},
-             float half = {{0.5}}, int64[3] shape = {{1,1,1}}>
+             int64[3] shape = {{1,1,1}}>
             {{ pixel = Slice(images, begin, end) flat = Reshape(pixel, shape)
-               level = Mul(flat, levels) class = Add(level, half)
+               class = Mul(flat, levels)
                output0 = Concat <axis = 2> (box, class) }}"""), frame).label.tolist()
     frame = np.full((240, 320, 3), (10, 20, 30), np.uint8)
     assert level_at(8, 8) == [30]
@@ -202,6 +202,56 @@ def test_a_missing_or_damaged_model_says_how_to_get_one(tmp_path):
     (tmp_path / 'text.onnx').write_text('not a model')
     with pytest.raises(ModelError, match=r'text.onnx cannot be loaded.*fetch-model'):
         ObjectDetector(tmp_path / 'text.onnx', 0.4)
+
+
+def rows_of(*rows, count=20):
+    values = np.zeros((1, count, 6), np.float32)
+    for number, row in enumerate(rows):
+        values[0, number] = row
+    return values
+
+
+@pytest.mark.parametrize(('values', 'text'), [
+    # YOLOv5 with one class: centre, size, objectness, class.
+    (rows_of([16, 16, 8, 8, 0.9, 0.95]), r'the class 0\.95 where a whole number'),
+    (rows_of([16, 16, 8, 8, 0.9, 1.0]), r'the box .* whose second corner is not right of'),
+    (rows_of([4, 8, 12, 12, 9.0, 1]), r'scores from 0 to 9 where 0 to 1'),
+    (rows_of([4, 8, 12, 12, np.nan, 1]), r'scores from nan to nan'),
+    (rows_of([4, 8, 12, 12, 0.9, np.nan]), r'the class nan'),
+    (rows_of([4, 8, np.nan, 12, 0.9, 1]), r'the box .*nan'),
+    (rows_of([0.1, 0.2, 0.4, 0.5, 0.9, 1]), r'boxes in shares of the image'),
+    # A pose head: what follows the class are key points, in pixels.
+    (raw_head([(8, 10, 8, 4, {0: 0.9, 1: 14.0, 2: 8.0})]), r'scores from 0 to 14'),
+    # Scores that went through no sigmoid, and an oriented box's angle.
+    (raw_head([(8, 10, 8, 4, {0: 0.9, 1: -3.5})]), r'scores from -3\.5 to 0\.9'),
+    (raw_head([(0.2, 0.3, 0.1, 0.2, {1: 0.9})]), r'boxes in shares of the image')])
+def test_heads_of_another_meaning_are_refused_by_their_values(values, text, onnx_model):
+    with pytest.raises(ModelError, match=rf'output output0 has {text}.*YOLOv8 or later'):
+        ObjectDetector(onnx_model(yolo(values)), 0.4, 1)
+
+
+def test_a_head_of_all_cells_is_not_taken_for_an_end_to_end_one(onnx_model):
+    # 32 x 32: 3 boxes for each of 16 + 4 + 1 cells. None of its boxes is sure of itself.
+    with pytest.raises(ModelError, match=r'1, 63, 6.*of YOLOv5 to 7: export it with'):
+        ObjectDetector(onnx_model(yolo(rows_of(count=63))), 0.4, 1)
+
+
+def test_a_head_of_all_cells_behind_a_free_shape_is_refused_by_its_rows(onnx_model):
+    # How many rows there are hangs on the image: no row is known before the network ran.
+    values = constant('values', rows_of(count=63))
+    path = onnx_model(f"""
+        m (float[1,3,32,32] images) => (float[1,N,6] output0)
+        <{values}, float limit = {{-1.0}}, int64[1] flat = {{-1}}, int64[1] start = {{0}},
+         int64[1] stop = {{63}}>
+        {{ line = Reshape(images, flat) some = Slice(line, start, stop)
+           kept = Greater(some, limit) output0 = Compress <axis = 1> (values, kept) }}""")
+    with pytest.raises(ModelError, match=r'has a row for each cell'):
+        ObjectDetector(path, 0.4, 1)
+
+
+def test_a_paddle_export_with_logits_is_refused(onnx_model):
+    with pytest.raises(ModelError, match=r'scores from 7 to 7'):
+        ObjectDetector(onnx_model(paddle([[2, 7.0, 10, 20, 60, 50]])), 0.4, 1)
 
 
 def detections(*boxes):

@@ -143,7 +143,7 @@ def test_bags_that_cannot_be_replayed_are_refused(tmp_path, bag):
     with pytest.raises(SequenceError, match=r'no frame of .* is left'):
         Replay(bag, ReplayConfig(start_s=77.0))
     poses = make.write_ros2(tmp_path / 'poses', make.pose_rows())
-    with pytest.raises(SequenceError, match=r'neither images nor graphs'):
+    with pytest.raises(SequenceError, match=r'neither images of a camera nor graphs'):
         Replay(poses, ReplayConfig())
     two = make.write_ros2(tmp_path / 'two', make.raw_rows(topic='/a') + make.raw_rows(topic='/b'))
     with pytest.raises(SequenceError, match=r'images on /a, /b'):

@@ -85,10 +85,10 @@ def test_several_cameras_are_ambiguous_and_depth_is_none(tmp_path):
     assert open_sequence(two, topic='/right').frame_count == 3
     with pytest.raises(SequenceError, match=r"no images on '/up'; topics with images: .*/left"):
         open_sequence(two, topic='/up')
-    with pytest.raises(SequenceError, match=r"encoding '16UC1': expected bgr8"):
+    with pytest.raises(SequenceError, match=r"encoding '16UC1' is depth"):
         open_sequence(two, topic='/depth')
     none = make.write_ros2(tmp_path / 'none', depth)
-    with pytest.raises(SequenceError, match=r'no camera images.*/depth \(sensor_msgs/msg/Image\)'):
+    with pytest.raises(SequenceError, match=r"no camera images.*/depth .*depth '16UC1'"):
         open_sequence(none)
 
 
@@ -228,11 +228,11 @@ def test_messages_missing_from_a_database_are_noticed(tmp_path):
 def test_truncated_message_is_refused(tmp_path):
     rows = make.raw_rows()
     rows[2][3].data = rows[2][3].data[:-9]
-    with pytest.raises(SequenceError, match=r'frame 2 on /camera/image_raw is truncated'):
+    with pytest.raises(SequenceError, match=r'frame 2 on /camera/image_raw: .* is truncated'):
         list(open_sequence(make.write_ros2(tmp_path / 'raw', rows)).frames())
     rows = make.jpeg_rows()
     rows[2][3].data = rows[2][3].data[:-9]
-    with pytest.raises(SequenceError, match=r'frame 2 on /image/compressed is a truncated JPEG'):
+    with pytest.raises(SequenceError, match=r'frame 2 on /image/compressed: .* truncated JPEG'):
         list(open_sequence(make.write_ros2(tmp_path / 'jpeg', rows)).frames())
 
 

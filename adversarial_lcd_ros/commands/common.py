@@ -58,6 +58,8 @@ def add_source_options(parser: ArgumentParser) -> None:
                        'use none (default: the only one that the source brings along)')
     group.add_argument('--rate-hz', type=float, metavar='X', help='sources without time stamps: '
                        'frames per second (default: 30)')
+    group.add_argument('--camera', metavar='NAME', help='folders: which of several cameras, as '
+                       'image_2 (KITTI), cam1 (EuRoC), fisheye1 (OpenLORIS)')
     group.add_argument('--stamps', choices=('header', 'log'), help='bags: stamps of the headers, '
                        'or log times where the headers are wrong (default: header, refused if '
                        'their clock jumps)')
@@ -77,7 +79,7 @@ def source_options(options: Namespace) -> dict[str, Any]:
     from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
     from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
 
-    given = {name: value for name in ('topic', 'ground_truth', 'rate_hz', 'stamps')
+    given = {name: value for name in ('topic', 'ground_truth', 'rate_hz', 'camera', 'stamps')
              if (value := getattr(options, name)) is not None}
     truth = {name: value for name in ('fixed_frame', 'body_frame', 'camera_frame')
              if (value := getattr(options, name)) is not None}

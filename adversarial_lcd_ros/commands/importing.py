@@ -17,8 +17,9 @@ from adversarial_lcd_ros.commands.common import (
 def add(commands: Commands) -> None:
     """Declare the command."""
     parser = add_command(commands, 'import', 'Turn a recorded sequence into a bag.', _import)
-    parser.add_argument('source', type=Path, help='TUM RGB-D folder, folder of images or of '
-                        'walks, 7-Scenes sequence, ROS 1 bag, or rosbag2')
+    parser.add_argument('source', type=Path, help='TUM RGB-D or Bonn folder, EuRoC, '
+                        'TUM-VI, KITTI odometry, OpenLORIS, Replica, ScanNet, 7-Scenes, folder of '
+                        'images or of walks, video, ROS 1 bag, or rosbag2')
     parser.add_argument('destination', type=Path, help='bag to write (rosbag2, MCAP)')
     parser.add_argument('--raw-as', choices=('jpeg', 'png'), default='jpeg', help='how frames '
                         'that come uncompressed are stored (default: %(default)s)')
@@ -33,6 +34,8 @@ def _import(options: Namespace) -> None:
         done = import_sequence(
             options.source, options.destination, progress=progress, overwrite=options.overwrite,
             raw_as=options.raw_as, **source_options(options))
+    for note in done.notes:
+        print(note)
     width, height = done.image_size
     print(f'{done.path}: {done.frames} frames of {width} x {height} pixels, {done.poses} poses, '
           f'{done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')

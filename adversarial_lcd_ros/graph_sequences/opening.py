@@ -6,8 +6,11 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+import hashlib
 import logging
+import os
 from pathlib import Path
+import tempfile
 from typing import TypeVar
 
 import numpy as np
@@ -25,6 +28,7 @@ from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.sequences.replay import Replay, read_payloads
+from adversarial_lcd_ros.sequences.yolo_labels import convert_labels
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 FRAMES_AT_ONCE = 2
@@ -104,6 +108,7 @@ def open_graphs(source: str, config: BuilderConfig | None = None, cache: Path | 
         save_graphs(path, graphs)
     elif progress:
         progress(len(graphs), len(graphs))
+    _warn_without_objects(sequence.name, graphs, config)
     return GraphSequence(_name(sequence.name, numbers, sequence.frame_count), graphs,
                          sequence.trajectory, sequence.image_size)
 
@@ -171,9 +176,35 @@ def for_sequence(config: BuilderConfig, sequence: Sequence) -> BuilderConfig:
         return config
     if not config.detections and sequence.detections:
         return replace(config, detections=str(sequence.detections))
-    if config.detections:
-        _check_detections(config, sequence)
+    if not config.detections:
+        return config
+    if Path(config.detections).is_dir():
+        config = replace(config, detections=str(_converted(Path(config.detections), sequence)))
+    _check_detections(config, sequence)
     return config
+
+
+def _converted(labels: Path, sequence: Sequence) -> Path:
+    """Return the labels of YOLO in a folder as CSV, which is named by its content."""
+    folder = cache_folder() / 'detections'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix='.labels-', dir=folder) as hidden:
+            work = Path(hidden) / 'detections.csv'
+            convert_labels(labels, sequence, work)
+            path = folder / f'{hashlib.blake2b(work.read_bytes(), digest_size=16).hexdigest()}.csv'
+            os.replace(work, path)
+    except OSError as error:
+        raise EvaluationError(f'detections cannot be kept in {folder} ({error}): set '
+                              'ADVERSARIAL_LCD_CACHE to another folder') from error
+    return path
+
+
+def _warn_without_objects(name: str, graphs: list[MultiTierGraph], config: BuilderConfig) -> None:
+    if config.detector != 'none' and not any(graph.object_count for graph in graphs):
+        _log.warning('%s: the detector "%s" found no object in any of %d frames; look at the '
+                     'settings model, object_score and min_object_area, or choose another '
+                     'detector', name, config.detector, len(graphs))
 
 
 def _check_detections(config: BuilderConfig, sequence: Sequence) -> None:

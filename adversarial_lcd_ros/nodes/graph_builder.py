@@ -37,7 +37,9 @@ from adversarial_lcd_ros.vision.objects import Detections
 
 IMAGE, COMPRESSED, DETECTIONS = 'image', 'image/compressed', 'detections'
 _REMEMBERED_STAMPS = 64
-_LOOK_PERIOD_S = 0.01
+_LOOK_PERIOD_S, _WARNING_PERIOD_S = 0.01, 5.0
+# So many frames without an object from the start on are worth a word.
+_SUSPICIOUS_FRAMES = 30
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class GraphBuilderNode(PipelineNode):
     wakes_itself = True
     manual = Manual(
         'camera frames to multi-tier graphs of objects and visual features',
-        subscribes=(f'{IMAGE} (sensor_msgs/Image: bgr8, rgb8 or mono8)',
+        subscribes=(f'{IMAGE} (sensor_msgs/Image: any encoding of cv_bridge but depth)',
                     f'{COMPRESSED} (sensor_msgs/CompressedImage: JPEG, PNG or WebP)',
                     f'{DETECTIONS} (std_msgs/UInt8MultiArray, Detections): the objects of each '
                     'frame, under detector:=topic'),
@@ -74,6 +76,7 @@ class GraphBuilderNode(PipelineNode):
         self._publish_guarded = self.diagnostics.guard('frame', self._publish)
         self._ready = self.create_guard_condition(
             self.diagnostics.guard('frame', self._publish_ready))
+        self._looks_for_objects = config.detector != 'none'
         self._sequence = 0
         self._graphs = create_payload_publisher(self, 'graph')
         self._overlays = self.create_publisher(Image, 'overlay', qos_profile_sensor_data)
@@ -148,8 +151,21 @@ class GraphBuilderNode(PipelineNode):
         self._graphs.publish(wrap(encode_graph(graph, self.session)))
         self.diagnostics.count('published graphs')
         self.diagnostics.time(time.perf_counter() - frame.arrival_s)
+        self._look_for_objects(graph)
         if self._overlays.get_subscription_count():
             self._publish_overlay(frame.header, frame.image, graph)
+
+    def _look_for_objects(self, graph: MultiTierGraph) -> None:
+        """Warn if the detector has never found anything, in frames enough to be suspicious."""
+        if graph.object_count or not self._looks_for_objects:
+            self._looks_for_objects = False
+            return
+        self.diagnostics.count('graphs without objects')
+        if self.diagnostics['graphs without objects'] >= _SUSPICIOUS_FRAMES:
+            self.get_logger().warning(
+                f'no object in any of {self.diagnostics["graphs without objects"]} frames: look '
+                'at model, object_score and min_object_area, or set detector',
+                throttle_duration_sec=_WARNING_PERIOD_S)
 
     def _is_repeat(self, topic: str, stamp_ns: int) -> bool:
         """Tell whether the frame came already on the other topic: drivers offer both."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.errors import CodecError, SequenceError
+from adversarial_lcd_ros.sequences.encodings import message_pixels
+from adversarial_lcd_ros.sequences.frame import check_camera_file, decode
 from adversarial_lcd_ros.sequences.picture_size import picture_size
-
-# Encoding to bytes a pixel, and what turns it into BGR.
-_ENCODINGS: dict[str, tuple[int, int | None]] = {
-    'bgr8': (3, None), 'rgb8': (3, cv2.COLOR_RGB2BGR), 'mono8': (1, None)}
 
 
 def check_size(width: int, height: int, max_pixels: int) -> None:
@@ -30,23 +27,11 @@ def image_pixels(message: Any, max_pixels: int) -> NDArray[np.uint8]:
     Raises
     ------
     CodecError
-        The encoding is not supported, or size, step and data contradict each other.
+        The encoding is not one of a camera, or size, step and data contradict each other.
 
     """
-    width, height, step = message.width, message.height, message.step
-    if message.encoding not in _ENCODINGS:
-        raise CodecError(f'image encoding {message.encoding!r}: expected one of '
-                         f'{", ".join(_ENCODINGS)}', cause='encoding')
-    channels, conversion = _ENCODINGS[message.encoding]
-    check_size(width, height, max_pixels)
-    if step < width * channels or len(message.data) < step * height:
-        raise CodecError(
-            f'{message.encoding} image of {width} x {height} pixels with {len(message.data)} '
-            f'bytes in rows of {step}: expected at least {width * channels} a row', cause='step')
-    rows: NDArray[np.uint8] = np.frombuffer(message.data, np.uint8, step * height)
-    shape = (height, width, 3) if channels == 3 else (height, width)
-    pixels = np.ascontiguousarray(rows.reshape(height, step)[:, :width * channels]).reshape(shape)
-    return pixels if conversion is None else np.asarray(cv2.cvtColor(pixels, conversion))
+    check_size(message.width, message.height, max_pixels)
+    return message_pixels(message)
 
 
 def compressed_pixels(message: Any, max_pixels: int) -> NDArray[np.uint8]:
@@ -56,16 +41,13 @@ def compressed_pixels(message: Any, max_pixels: int) -> NDArray[np.uint8]:
     Raises
     ------
     CodecError
-        The data are no such image, or its header declares more pixels than the limit.
+        The data are no such image, or depth, or the header declares more pixels than the limit.
 
     """
-    data: NDArray[np.uint8] = np.frombuffer(message.data, np.uint8)
-    what = f'compressed image of format {message.format[:40]!r}'
-    check_size(*picture_size(data.tobytes(), what), max_pixels)
+    data, what = bytes(message.data), f'compressed image of format {message.format[:40]!r}'
+    check_size(*picture_size(data, what), max_pixels)
     try:
-        pixels = cv2.imdecode(data, cv2.IMREAD_COLOR)
-    except cv2.error as error:
-        raise CodecError(f'{what} cannot be decoded: {error}', cause='format') from error
-    if pixels is None:
-        raise CodecError(f'{what} cannot be decoded: {len(data)} damaged bytes', cause='format')
-    return np.asarray(pixels, np.uint8)
+        check_camera_file(data, message.format)
+        return decode(data, what)
+    except SequenceError as error:
+        raise CodecError(str(error), cause='format') from error

@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
 from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -21,6 +20,9 @@ from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
 from adversarial_lcd_ros.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, join_ns
+from adversarial_lcd_ros.sequences.damage import METADATA, diagnose, missing_messages
+from adversarial_lcd_ros.sequences.image_files import is_hidden
+from adversarial_lcd_ros.sequences.rosbag2 import Rosbag2Reader
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 IMAGE, COMPRESSED_IMAGE = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
+CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
 POSE = 'geometry_msgs/msg/PoseStamped'
 PAYLOAD = WIRE_TYPE
 TF = 'tf2_msgs/msg/TFMessage'
@@ -35,7 +38,6 @@ TF = 'tf2_msgs/msg/TFMessage'
 OLD_TF = ('tf/msg/tfMessage', 'tf/msg/TFMessage')
 ROS1_SUFFIX = '.bag'
 ROS2_SUFFIXES = ('.mcap', '.db3')
-METADATA = 'metadata.yaml'
 _NS = 1_000_000_000
 _BAG_VERSION: Literal[9] = 9
 
@@ -44,7 +46,7 @@ def is_bag(path: Path) -> bool:
     """Tell whether a path looks like a bag: ROS 1 file, rosbag2 folder, or a rosbag2's file."""
     if path.is_dir():
         return (path / METADATA).is_file() or any(
-            child.suffix in ROS2_SUFFIXES for child in path.iterdir())
+            child.suffix in ROS2_SUFFIXES and not is_hidden(child) for child in path.iterdir())
     return path.suffix in (ROS1_SUFFIX, *ROS2_SUFFIXES)
 
 
@@ -64,10 +66,15 @@ def _explained(path: Path) -> Iterator[None]:
         raise
     except Exception as error:
         # A damaged bag can break anything in the reader: no list of classes is complete.
-        detail = str(error) or type(error).__name__
-        raise SequenceError(
-            f'bag {path} cannot be read ({detail}): it is truncated, damaged, or was not closed; '
-            'get it again, or repair it with "rosbag reindex" or "ros2 bag reindex"') from error
+        detail = ' '.join((str(error) or type(error).__name__).split())
+        raise SequenceError(f'bag {path} cannot be read: {_diagnosis(path, detail)}') from error
+
+
+def _diagnosis(path: Path, detail: str) -> str:
+    try:
+        return diagnose(path, detail)
+    except OSError as error:
+        return f'{detail} ({error})'
 
 
 class BagFile:
@@ -100,7 +107,7 @@ class BagFile:
         self.is_ros1 = path.is_file() and path.suffix == ROS1_SUFFIX
         self._types = _ros1_typestore() if self.is_ros1 else typestore()
         with _explained(path):
-            self._reader: Any = Reader1(path) if self.is_ros1 else Reader2(path)
+            self._reader: Any = Reader1(path) if self.is_ros1 else Rosbag2Reader(path)
             self._reader.open()
             connections: Sequence[Connection] = self._reader.connections
             self.topics = {entry.topic: entry.msgtype for entry in connections}
@@ -145,8 +152,7 @@ class BagFile:
                 found += 1
                 yield connection.topic, log_ns, bytes(wire)
         if found != expected:
-            raise SequenceError(f'bag {self.path} is truncated: {found} of {expected} messages '
-                                f'on {", ".join(topics)} could be read')
+            raise SequenceError(missing_messages(self.path, found, expected, ', '.join(topics)))
 
     def decode(self, topic: str, wire: bytes) -> Any:
         """Return the message in the bytes of a topic; raises SequenceError."""

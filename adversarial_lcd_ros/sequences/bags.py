@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import CodecError, SequenceError
 from adversarial_lcd_ros.sequences.bag_truth import BagTruth, TruthOptions
-from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, BagFile
-from adversarial_lcd_ros.sequences.frame import RAW_CHANNELS, Frame, open_compressed
+from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BagFile
+from adversarial_lcd_ros.sequences.encodings import DEPTH, is_camera, message_pixels
+from adversarial_lcd_ros.sequences.frame import Frame, check_camera_file, open_compressed
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.stamps import LOG, frame_stamps
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
-
-# image_transport puts depth into CompressedImage, too.
-_DEPTH = 'compresseddepth'
 
 
 def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,
@@ -50,6 +49,7 @@ def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,
         size = _size(message, _what(path, chosen, 0))
         found = BagTruth(bag, stamps_ns, (chosen, message.header.frame_id), truth,
                          stamps).find(ground_truth)
+        focal_length_px = _focal_length(bag, chosen, message.header.frame_id, size)
 
     def read(wanted: range) -> Iterator[Frame]:
         with BagFile(path) as source:
@@ -59,7 +59,7 @@ def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,
                 yield replace(frame, stamp_ns=log_ns) if stamps == LOG else frame
 
     return Sequence(path.resolve().stem, path, stamps_ns, size, found.trajectory, read,
-                    truth=found.text)
+                    focal_length_px=focal_length_px, truth=found.text)
 
 
 def bag_trajectory(path: Path, stamps_ns: NDArray[np.int64],
@@ -89,24 +89,75 @@ def _what(path: Path, topic: str, number: int) -> str:
     return f'{path}: frame {number} on {topic}'
 
 
+def _focal_length(bag: BagFile, topic: str, frame_id: str,
+                  size: tuple[int, int]) -> float | None:
+    """
+    Return fx of the camera's CameraInfo, pixels; None where no topic is known to be its own.
+
+    By the convention of image_transport it lies beside the raw images. Else one counts that is
+    of the same frame and image size.
+    """
+    topics = bag.of_type(CAMERA_INFO)
+    raw = topic.removesuffix('/compressed')
+    beside = f'{raw.rsplit("/", 1)[0]}/camera_info'
+    messages = {name: _first(bag, name) for name in topics}
+    own = messages.get(beside) or next(
+        (message for message in messages.values()
+         if frame_id and message.header.frame_id == frame_id), None)
+    if own is None or (int(own.width), int(own.height)) != size:
+        return None
+    # ROS 1 calls the matrix K; drivers without a calibration leave it at 0.
+    focal = float((own.k if hasattr(own, 'k') else own.K)[0])
+    return focal if math.isfinite(focal) and focal > 0 else None
+
+
 def _find_topic(bag: BagFile) -> str:
-    topics = [topic for topic in bag.of_type(IMAGE, COMPRESSED_IMAGE) if _is_camera(bag, topic)]
+    topics = camera_topics(bag)
     if len(topics) == 1:
         return topics[0]
     if topics:
         raise SequenceError(f'bag {bag.path} has camera images on {", ".join(topics)}: name the '
                             'topic to use')
-    there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(bag.topics.items()))
-    raise SequenceError(f'bag {bag.path} has no camera images (sensor_msgs/Image in '
-                        f'{", ".join(RAW_CHANNELS)}, or CompressedImage); it has '
-                        f'{there or "no topics"}')
+    raise SequenceError(f'bag {bag.path} has no camera images (sensor_msgs/Image in an '
+                        'encoding that cv_bridge knows, or CompressedImage); it has '
+                        f'{described_topics(bag)}')
+
+
+def camera_topics(bag: BagFile) -> list[str]:
+    """Return the topics whose first message is a camera's, and not depth, sorted."""
+    return [topic for topic in bag.of_type(IMAGE, COMPRESSED_IMAGE) if _is_camera(bag, topic)]
+
+
+def described_topics(bag: BagFile) -> str:
+    """Return the topics of a bag, with their types and, of images, their encodings."""
+    return ', '.join(f'{topic} ({_kind(bag, topic)})' for topic in sorted(bag.topics)
+                     ) or 'no topics'
 
 
 def _is_camera(bag: BagFile, topic: str) -> bool:
-    message = bag.decode(topic, next(iter(bag.messages([topic])))[2])
+    message = _first(bag, topic)
     if bag.topics[topic] == IMAGE:
-        return message.encoding in RAW_CHANNELS
-    return _DEPTH not in message.format.lower()
+        return is_camera(message.encoding)
+    try:
+        check_camera_file(bytes(message.data), message.format)
+    except SequenceError:
+        return False
+    return True
+
+
+def _kind(bag: BagFile, topic: str) -> str:
+    """Return the type of a topic, and of images what they are encoded in."""
+    kind = bag.topics[topic]
+    if kind not in (IMAGE, COMPRESSED_IMAGE) or not bag.counts[topic]:
+        return kind if bag.counts[topic] else f'{kind}, empty'
+    message = _first(bag, topic)
+    if kind == IMAGE:
+        return f'{kind}, {"depth " * (message.encoding in DEPTH)}{message.encoding!r}'
+    return f'{kind}, {message.format!r}'
+
+
+def _first(bag: BagFile, topic: str) -> Any:
+    return bag.decode(topic, next(iter(bag.messages([topic])))[2])
 
 
 def _check_topic(bag: BagFile, topic: str) -> None:
@@ -126,18 +177,16 @@ def _size(message: Any, what: str) -> tuple[int, int]:
 def _frame(message: Any, what: str, size: tuple[int, int] | None) -> Frame:
     stamp = message.header.stamp
     stamp_ns = int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
-    if hasattr(message, 'format'):
-        return open_compressed(stamp_ns, bytes(message.data), what, size)
-    width, height, step = int(message.width), int(message.height), int(message.step)
-    channels = RAW_CHANNELS.get(message.encoding)
-    if channels is None:
-        raise SequenceError(f'{what} has encoding {message.encoding!r}: expected '
-                            f'{", ".join(RAW_CHANNELS)}')
-    if (size or (width, height)) != (width, height):
-        raise SequenceError(f'{what} is {width} x {height} pixels, the first one {size}: a '
-                            'sequence has one image size')
-    if not width * height or step < width * channels or len(message.data) < step * height:
-        raise SequenceError(f'{what} is truncated: {len(message.data)} bytes for {width} x '
-                            f'{height} pixels of {message.encoding} in rows of {step}')
-    rows = np.frombuffer(message.data, np.uint8, step * height).reshape(height, step)
-    return Frame(stamp_ns, rows[:, :width * channels].tobytes(), message.encoding, width, height)
+    try:
+        if hasattr(message, 'format'):
+            data = bytes(message.data)
+            check_camera_file(data, message.format)
+            return open_compressed(stamp_ns, data, f'format {message.format!r}', size)
+        frame = Frame.of_pixels(stamp_ns, message_pixels(message))
+    except (SequenceError, CodecError) as error:
+        raise SequenceError(f'{what}: {error}') from error
+    if (size or (frame.width, frame.height)) != (frame.width, frame.height):
+        raise SequenceError(f'{what} is {frame.width} x {frame.height} pixels, the first one '
+                            f'{size}: a sequence has one image size')
+    return frame
+

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.text_files import read_text
 from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
 
 DETECTIONS_FILE = 'detections.csv'
 COLUMNS = ('timestamp', 'class', 'x', 'y', 'w', 'h', 'score')
 # What published files call the class.
 _CLASS_COLUMNS = ('class', 'coco_class')
-_MAX_CLASS = 2**32 - 1
+MAX_CLASS = 2**32 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,10 @@ def read_detections(path: Path) -> DetectionTable:
         The file is missing, is no such CSV, or a line is wrong; the line is named.
 
     """
+    if path.is_dir():
+        raise SequenceError(f'{path} is a folder: labels of YOLO are read with the pictures that '
+                            'they belong to: adversarial-lcd build PICTURES BAG --detector csv '
+                            f'--detections {path}')
     rows = list(_rows(path))
     if not rows:
         raise SequenceError(f'{path} holds no detection: expected lines of {",".join(COLUMNS)}')
@@ -89,12 +94,11 @@ def read_detections(path: Path) -> DetectionTable:
 
 def _rows(path: Path) -> Iterator[tuple[int, int, float, float, float, float, float]]:
     try:
-        with path.open(encoding='utf-8', newline='') as file:
-            lines = csv.reader(file, strict=True)
-            _check_header(path, next(lines, []))
-            for fields in lines:
-                yield _row(f'{path}, line {lines.line_num}', fields)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = csv.reader(read_text(path).splitlines(), strict=True)
+        _check_header(path, next(lines, []))
+        for fields in lines:
+            yield _row(f'{path}, line {lines.line_num}', fields)
+    except csv.Error as error:
         raise SequenceError(f'{path} cannot be read as CSV: {error}') from error
 
 
@@ -114,8 +118,8 @@ def _row(where: str, fields: list[str]) -> tuple[int, int, float, float, float, 
         x, y, width, height, score = (float(text) for text in fields[2:])
     except ValueError as error:
         raise SequenceError(f'{where}: {error}') from None
-    if not 0 <= label <= _MAX_CLASS:
-        raise SequenceError(f'{where}: class {label}; expected 0 to {_MAX_CLASS}')
+    if not 0 <= label <= MAX_CLASS:
+        raise SequenceError(f'{where}: class {label}; expected 0 to {MAX_CLASS}')
     if not all(map(math.isfinite, (x, y, width, height))) or min(width, height) <= 0:
         raise SequenceError(f'{where}: box {",".join(fields[2:6])}; expected finite numbers, and '
                             'a width and height above 0')

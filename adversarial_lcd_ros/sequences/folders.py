@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 import re
 
@@ -11,41 +12,70 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
-from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame, open_compressed
+from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame
 from adversarial_lcd_ros.sequences.frame_poses import image_poses, read_poses
+from adversarial_lcd_ros.sequences.image_choice import camera_images, named_stamps
+from adversarial_lcd_ros.sequences.image_files import (
+    file_sequence,
+    images_in,
+    is_depth_image,
+    is_hidden,
+    read_image,
+    ticks,
+)
+from adversarial_lcd_ros.sequences.layouts.tum import list_images
 from adversarial_lcd_ros.sequences.pose_files import (
     check_pose_matrix,
     matrix_trajectory,
     read_matrices,
 )
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import (
-    PLACE_INDEX,
-    Trajectory,
-    parse_stamp_ns,
-)
+from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX, Trajectory
 
 TUM_IMAGES, TUM_TRUTH = 'rgb.txt', 'groundtruth.txt'
-DEFAULT_RATE_HZ = 30.0
 # Longer than any gap that a detector or a label leaves between a frame and its loops.
 WALK_GAP_S = 60.0
-_SUFFIXES = ('.jpg', '.jpeg', '.png')
 _SEVEN_SCENES_COLOUR = '.color.png'
-
-
-def images_in(folder: Path) -> list[Path]:
-    """Return the JPEG and PNG files of a folder; numbers in names count as numbers."""
-    paths = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
-    return sorted(paths, key=lambda path: [
-        (int(part), '') if part.isdigit() else (-1, part)
-        for part in re.split(r'([0-9]+)', path.name)])
+# What several cameras, eyes, or pictures that are no camera's, are called.
+_ONE_VIEW = re.compile(
+    r'(image|img)s?[_-]?([0-9]{1,2}|left|right|l|r)|(cam|camera)s?([_-].*|[0-9].*|left|right)?|'
+    r'(stereo|mono)[_-].*|(left|right)([_-]?(image|cam|camera|eye)s?)?|.*depth.*|'
+    r'disp(arity)?.*|colou?r|rgb|infra.*|ir[0-9]?|fisheye[0-9]|masks?|semantics?|labels?|'
+    r'segmentation|normals?|flow', re.IGNORECASE)
 
 
 def walks_in(folder: Path) -> dict[Path, list[Path]]:
-    """Return the images of each subfolder, if each subfolder of a folder holds some."""
-    walks = {path: images_in(path) for path in sorted(folder.iterdir()) if path.is_dir()}
-    return walks if len(walks) > 1 and all(walks.values()) else {}
+    """
+    Return the images of each subfolder, if each subfolder of a folder holds some.
+
+    Raises
+    ------
+    SequenceError
+        The subfolders are named as the cameras of one recording, or depth, are, or their images
+        by times that overlap.
+
+    """
+    walks = {path: images_in(path) for path in sorted(folder.iterdir())
+             if path.is_dir() and not is_hidden(path)}
+    if len(walks) < 2 or not any(walks.values()):
+        return {}
+    views = [path.name for path in walks if _ONE_VIEW.fullmatch(path.name)]
+    views += [path.name for path, images in walks.items()
+              if images and is_depth_image(images[0]) and path.name not in views]
+    if not views and _are_simultaneous(list(walks.values())):
+        views = [path.name for path in walks]
+    if views:
+        there = ', '.join(path.name for path, images in walks.items() if images)
+        raise SequenceError(
+            f'{folder} holds views of one recording ({", ".join(views)}), not walks: choose the '
+            f'camera (--camera) among {there}')
+    return walks if all(walks.values()) else {}
+
+
+def _are_simultaneous(walks: list[list[Path]]) -> bool:
+    """Tell whether any two walks, by the times that their images are named by, overlap."""
+    spans = sorted((stamps[0], stamps[-1]) for images in walks if (stamps := named_stamps(images)))
+    return any(later[0] <= earlier[1] for earlier, later in pairwise(spans))
 
 
 def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
@@ -54,19 +84,11 @@ def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
 
     Ground truth is groundtruth.txt, where it is there, unless another file is given.
     """
-    stamps, paths = [], []
-    for where, (stamp, name) in text_rows(folder / TUM_IMAGES, 'timestamp filename'):
-        try:
-            stamps.append(parse_stamp_ns(stamp))
-        except ValueError as error:
-            raise SequenceError(f'{where}: {error}') from None
-        paths.append(folder / name)
-        if not paths[-1].is_file():
-            raise SequenceError(f'{where}: there is no image {paths[-1]}')
+    stamps, paths = list_images(folder / TUM_IMAGES)
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
     trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
-    return _sequence(folder, paths, stamps, trajectory)
+    return file_sequence(folder, paths, stamps, trajectory)
 
 
 def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
@@ -81,7 +103,7 @@ def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
     if not samples:
         raise SequenceError(f'{folder} has {DETECTIONS_FILE}, but neither {TUM_IMAGES} nor a '
                             'picture in rgb/: put at least one there, to tell the image size')
-    sample = _open(samples[0], 0, None)
+    sample = read_image(samples[0], 0, None)
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
     trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
@@ -94,17 +116,25 @@ def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
                     trajectory, read, folder / DETECTIONS_FILE)
 
 
-def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None) -> Sequence:
+def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None,
+                 camera: str | None = None) -> Sequence:
     """
     Open a folder of images in order of their names.
 
-    Where there is ground truth, ``image_poses`` tells which pose is that of which image.
+    Where all names are times since 1970, these are the stamps. Else, where there is ground truth,
+    ``image_poses`` tells which pose is that of which image.
     """
-    paths = images_in(folder)
-    ticks = _ticks(len(paths), rate_hz)
+    paths, notes = camera_images(folder, camera)
+    named = named_stamps(paths) if rate_hz is None else None
+    if named is not None:
+        trajectory = None if ground_truth is None else read_poses(ground_truth, named)
+        notes += (f'{folder}: stamps are those that the images are named by',)
+        return file_sequence(folder, paths, named, trajectory, notes=notes)
+    stamps = ticks(len(paths), rate_hz)
     if ground_truth is None:
-        return _sequence(folder, paths, ticks, None)
-    return _sequence(folder, paths, *image_poses(ground_truth, ticks, rate_hz is not None))
+        return file_sequence(folder, paths, stamps, None, notes=notes)
+    return file_sequence(folder, paths, *image_poses(ground_truth, stamps, rate_hz is not None),
+                         notes=notes)
 
 
 def walk_folders(folder: Path, walks: dict[Path, list[Path]],
@@ -121,14 +151,14 @@ def walk_folders(folder: Path, walks: dict[Path, list[Path]],
             'images: ground truth by index needs as many in each; import one walk by its own '
             'folder')
     count = next(iter(counts.values()))
-    ticks = _ticks(count, rate_hz)
-    period_ns = int(ticks[-1]) + round(WALK_GAP_S * 1e9)
-    stamps = np.concatenate([ticks + walk * period_ns for walk in range(len(walks))])
+    once = ticks(count, rate_hz)
+    period_ns = int(once[-1]) + round(WALK_GAP_S * 1e9)
+    stamps = np.concatenate([once + walk * period_ns for walk in range(len(walks))])
     position = np.zeros((len(stamps), 3))
     position[:, 0] = np.tile(np.arange(count), len(walks))
     upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(stamps), 1))
     paths = [path for images in walks.values() for path in images]
-    return _sequence(folder, paths, stamps, Trajectory(stamps, position, upright, PLACE_INDEX))
+    return file_sequence(folder, paths, stamps, Trajectory(stamps, position, upright, PLACE_INDEX))
 
 
 def is_seven_scenes(folder: Path) -> bool:
@@ -141,39 +171,10 @@ def seven_scenes(folder: Path, rate_hz: float | None) -> Sequence:
     paths = sorted(folder.glob(f'frame-*{_SEVEN_SCENES_COLOUR}'))
     poses = np.stack([_pose_matrix(
         path.with_name(path.name.replace(_SEVEN_SCENES_COLOUR, '.pose.txt'))) for path in paths])
-    stamps = _ticks(len(paths), rate_hz)
-    return _sequence(folder, paths, stamps, matrix_trajectory(stamps, poses))
+    stamps = ticks(len(paths), rate_hz)
+    return file_sequence(folder, paths, stamps, matrix_trajectory(stamps, poses))
 
 
 def _pose_matrix(path: Path) -> NDArray[np.float64]:
     matrices = read_matrices(path)
     return check_pose_matrix(matrices[0] if len(matrices) == 1 else matrices, str(path))
-
-
-def _ticks(count: int, rate_hz: float | None) -> NDArray[np.int64]:
-    rate = DEFAULT_RATE_HZ if rate_hz is None else rate_hz
-    ticks: NDArray[np.int64] = np.round(np.arange(count) * (1e9 / rate)).astype(np.int64)
-    return ticks
-
-
-def _sequence(folder: Path, paths: list[Path], stamps: list[int] | NDArray[np.int64],
-              trajectory: Trajectory | None) -> Sequence:
-    if not paths:
-        raise SequenceError(f'{folder} holds no camera frame')
-    first = _open(paths[0], 0, None)
-    size = first.width, first.height
-    stamps_ns = np.asarray(stamps, np.int64)
-
-    def read(wanted: range) -> Iterator[Frame]:
-        for number in wanted:
-            yield _open(paths[number], int(stamps_ns[number]), size)
-
-    return Sequence(folder.resolve().name, folder, stamps_ns, size, trajectory, read)
-
-
-def _open(path: Path, stamp_ns: int, size: tuple[int, int] | None) -> Frame:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SequenceError(f'image {path} cannot be read: {error}') from error
-    return open_compressed(stamp_ns, data, f'image {path}', size)

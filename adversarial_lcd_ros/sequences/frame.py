@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import re
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import CodecError, SequenceError
+from adversarial_lcd_ros.sequences.encodings import DEPTH, MAX_PIXELS
+from adversarial_lcd_ros.sequences.picture_size import picture_size
 
-JPEG, PNG = 'jpeg', 'png'
+JPEG, PNG, WEBP = 'jpeg', 'png', 'webp'
 NO_PICTURE = 'none'
-RAW_CHANNELS = {'bgr8': 3, 'rgb8': 3, 'mono8': 1}
+RAW_CHANNELS = {'bgr8': 3, 'mono8': 1}
 JPEG_QUALITY = 95
 _WRITE_OPTIONS = {JPEG: [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY], PNG: []}
-_MAGIC = {JPEG: b'\xff\xd8\xff', PNG: b'\x89PNG\r\n\x1a\n'}
+# WebP has four bytes of length behind the first four.
+_MAGIC = {JPEG: re.compile(rb'\xff\xd8\xff'), PNG: re.compile(rb'\x89PNG\r\n\x1a\n'),
+          WEBP: re.compile(rb'RIFF.{4}WEBP', re.DOTALL)}
 _PNG_END = b'IEND\xaeB`\x82'
+# Behind magic, length and name of the header: width, height, bits, kind (0: grey).
+_PNG_BITS = slice(24, 26)
 _JPEG_SCAN, _JPEG_END = 0xDA, b'\xff\xd9'
 
 
@@ -30,9 +37,9 @@ class Frame:
     stamp_ns : int
         Nanoseconds.
     data : bytes
-        A JPEG or PNG file, or rows of pixels without padding.
+        A JPEG, PNG or WebP file, or rows of pixels without padding.
     encoding : str
-        'jpeg', 'png', 'bgr8', 'rgb8' or 'mono8'; 'none' where nobody kept the picture: there
+        'jpeg', 'png', 'webp', 'bgr8' or 'mono8'; 'none' where nobody kept the picture: there
         are no data.
     width, height : int
         Pixels.
@@ -72,7 +79,7 @@ class Frame:
         """
         Return the frame as a JPEG of quality 95, or as a PNG, which keeps every pixel.
 
-        A frame that is a JPEG or PNG already is returned as it is, whatever is asked for.
+        A frame that is an image file already is returned as it is, whatever is asked for.
         """
         if self.encoding not in RAW_CHANNELS:
             return self
@@ -93,15 +100,21 @@ class Frame:
                 f'for {self.width} x {self.height} pixels of {self.encoding}')
         pixels: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8).reshape(
             self.height, self.width, channels)
-        if self.encoding == 'bgr8':
+        if channels == 3:
             return pixels.copy()
-        code = cv2.COLOR_RGB2BGR if self.encoding == 'rgb8' else cv2.COLOR_GRAY2BGR
-        return np.asarray(cv2.cvtColor(pixels, code))
+        return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR))
+
+    @classmethod
+    def of_pixels(cls, stamp_ns: int, pixels: NDArray[np.uint8]) -> Frame:
+        """Return the frame of uint8 pixels, (h, w, 3) BGR or (h, w) grey."""
+        height, width = pixels.shape[:2]
+        return cls(stamp_ns, pixels.tobytes(), 'bgr8' if pixels.ndim == 3 else 'mono8', width,
+                   height)
 
 
 def compressed_encoding(data: bytes, what: str) -> str:
     """
-    Return 'jpeg' or 'png', by the first bytes of an image file and its end marker.
+    Return 'jpeg', 'png' or 'webp', by the first bytes of an image file and its end.
 
     Some versions of OpenCV fill up a truncated image with grey and only warn: hence the look
     for the end. Behind it, cameras put padding and data of their own.
@@ -109,18 +122,53 @@ def compressed_encoding(data: bytes, what: str) -> str:
     Raises
     ------
     SequenceError
-        The data are neither, or end too early.
+        The data are none of these, or end too early.
 
     """
     for encoding, magic in _MAGIC.items():
-        if data.startswith(magic):
-            is_whole = _has_jpeg_end(data) if encoding == JPEG else _PNG_END in data
-            if not is_whole:
+        if magic.match(data):
+            if not _is_whole(encoding, data):
                 raise SequenceError(f'{what} is a truncated {encoding.upper()} of {len(data)} '
                                     'bytes: get the sequence again')
             return encoding
     raise SequenceError(f'{what}: {len(data)} bytes that start with {data[:4].hex() or "nothing"} '
-                        'are neither a JPEG nor a PNG')
+                        'are neither a JPEG nor a PNG or WebP')
+
+
+def is_depth_file(data: bytes) -> bool:
+    """Tell whether an image file is a PNG of 16 bits a pixel without colour, as depth maps are."""
+    return bool(_MAGIC[PNG].match(data)) and data[_PNG_BITS] == b'\x10\x00'
+
+
+def check_camera_file(data: bytes, text: str) -> None:
+    """
+    Raise SequenceError if an image file in a CompressedImage is depth, or a bare mosaic.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    text : str
+        The message's format, as 'bgr8; jpeg compressed bgr8', or just 'jpeg'.
+
+    """
+    encoding = text.split(';')[0].strip()
+    if 'compresseddepth' in text.lower() or encoding in DEPTH:
+        raise SequenceError(f'format {text!r} is depth: expected the images of a camera')
+    if encoding.startswith('bayer_') and text.rstrip().endswith('compressed'):
+        raise SequenceError(f'format {text!r} is a mosaic that was compressed as it is: expected '
+                            'colour or grey')
+    if is_depth_file(data) and encoding != 'mono16':
+        raise SequenceError(f'format {text!r}, but a PNG of 16 bits without colour: depth; '
+                            'expected the images of a camera')
+
+
+def _is_whole(encoding: str, data: bytes) -> bool:
+    if encoding == JPEG:
+        return _has_jpeg_end(data)
+    if encoding == PNG:
+        return _PNG_END in data
+    return len(data) >= 8 + int.from_bytes(data[4:8], 'little')
 
 
 def _has_jpeg_end(data: bytes) -> bool:
@@ -134,8 +182,9 @@ def _has_jpeg_end(data: bytes) -> bool:
 
 
 def decode(data: bytes, what: str) -> NDArray[np.uint8]:
-    """Return the pixels of a JPEG or PNG as BGR, uint8 (h, w, 3); raises SequenceError."""
+    """Return the pixels of an image file as BGR, uint8 (h, w, 3); raises SequenceError."""
     compressed_encoding(data, what)
+    _check_declared_size(data, what)
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error as error:
@@ -146,10 +195,21 @@ def decode(data: bytes, what: str) -> NDArray[np.uint8]:
     return np.asarray(pixels, np.uint8)
 
 
+def _check_declared_size(data: bytes, what: str) -> None:
+    # A megabyte of PNG may declare, and would become, gigabytes of pixels.
+    try:
+        width, height = picture_size(data, what)
+    except CodecError as error:
+        raise SequenceError(str(error)) from error
+    if not 0 < width * height <= MAX_PIXELS:
+        raise SequenceError(f'{what} declares {width} x {height} pixels: expected 1 to '
+                            f'{MAX_PIXELS}')
+
+
 def open_compressed(stamp_ns: int, data: bytes, what: str,
                     size: tuple[int, int] | None = None) -> Frame:
     """
-    Return the frame in a JPEG or PNG file.
+    Return the frame in a JPEG, PNG or WebP file.
 
     Without its size (width, height) the data are decoded for it; with it, only their ends are
     looked at, and ``Frame.image`` holds the rest against it.

@@ -13,7 +13,7 @@ import numpy as np
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
-from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter
+from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
@@ -21,6 +21,7 @@ from adversarial_lcd_ros.sequences.sequence import Coverage, Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
+CAMERA_INFO_TOPIC = '/camera_info'
 CAMERA_FRAME = 'camera'
 # Poses from so long before the first frame to so long after the last one are kept.
 _MARGIN_NS = 100_000_000
@@ -40,12 +41,13 @@ class ImportSummary:
     duration_s: float
     size_bytes: int
     coverage: Coverage
+    notes: tuple[str, ...] = ()
 
 
 def import_sequence(source: Path | str, destination: Path | str, *,
                     progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
                     topic: str | None = None, ground_truth: Path | str | None = None,
-                    rate_hz: float | None = None, raw_as: str = JPEG,
+                    rate_hz: float | None = None, camera: str | None = None, raw_as: str = JPEG,
                     truth: TruthOptions | None = None,
                     stamps: str | None = None) -> ImportSummary:
     """
@@ -53,13 +55,14 @@ def import_sequence(source: Path | str, destination: Path | str, *,
 
     Frames become sensor_msgs/CompressedImage on /image/compressed: JPEG and PNG files with
     their bytes untouched, raw images as JPEG of quality 95 or as PNG. Every frame is decoded
-    once, as a check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth. Credits
-    and licence files of a source folder go with the pictures. With one release of rosbags, the
+    once, as a check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth, a focal
+    length that the recording tells one sensor_msgs/CameraInfo on /camera_info. Credits and
+    licence files of a source folder go with the pictures. With one release of rosbags, the
     same source always gives the same bytes.
 
     Parameters
     ----------
-    source, topic, ground_truth, rate_hz, truth, stamps
+    source, topic, ground_truth, rate_hz, camera, truth, stamps
         See ``open_sequence``.
     destination : Path or str
         Folder of the bag; it appears when it is complete, or not at all.
@@ -81,13 +84,14 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
         sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz,
-                                 truth=truth, stamps=stamps)
+                                 camera=camera, truth=truth, stamps=stamps)
         poses = list(pose_messages(sequence.trajectory, int(sequence.stamps_ns[0]),
                                    int(sequence.stamps_ns[-1])))
         frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
-        # At the same time, the pose comes first: the key sorts by nothing else.
+        # At the same time, the image comes last: the key sorts by nothing else.
         for message_topic, message_type, stamp_ns, cdr in heapq.merge(
-                poses, map(_image_message, frames), key=lambda row: row[2]):
+                camera_messages(sequence), poses, map(_image_message, frames),
+                key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
         for file in _terms(Path(source)):
             bag.attach(file)
@@ -99,7 +103,7 @@ def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
     return ImportSummary(
         path, sequence.name, sequence.frame_count, poses, sequence.image_size,
         float(stamps[-1] - stamps[0]) / 1e9, sum(file.stat().st_size for file in path.iterdir()),
-        sequence.coverage)
+        sequence.coverage, sequence.notes)
 
 
 def _terms(source: Path) -> list[Path]:
@@ -125,6 +129,24 @@ def _image_message(frame: Frame) -> tuple[str, str, int, bytes]:
         data=np.frombuffer(frame.data, np.uint8))
     return (IMAGE_TOPIC, COMPRESSED_IMAGE, frame.stamp_ns,
             bytes(typestore().serialize_cdr(message, COMPRESSED_IMAGE)))
+
+
+def camera_messages(sequence: Sequence) -> Iterator[tuple[str, str, int, bytes]]:
+    """Yield what is known of the camera, with the first frame: (topic, type, stamp, CDR)."""
+    if sequence.focal_length_px is None:
+        return
+    (width, height), focal = sequence.image_size, float(sequence.focal_length_px)
+    matrix = [focal, 0.0, width / 2, 0.0, focal, height / 2, 0.0, 0.0, 1.0]
+    types: Any = typestore().types
+    stamp_ns = int(sequence.stamps_ns[0])
+    message = types[CAMERA_INFO](
+        header=header(stamp_ns, CAMERA_FRAME), height=height, width=width, distortion_model='',
+        d=np.zeros(0), k=np.array(matrix), r=np.eye(3).ravel(),
+        p=np.insert(np.array(matrix), (3, 6, 9), 0.0), binning_x=0, binning_y=0,
+        roi=types['sensor_msgs/msg/RegionOfInterest'](
+            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False))
+    yield (CAMERA_INFO_TOPIC, CAMERA_INFO, stamp_ns,
+           bytes(typestore().serialize_cdr(message, CAMERA_INFO)))
 
 
 def pose_messages(trajectory: Trajectory | None, first_ns: int,

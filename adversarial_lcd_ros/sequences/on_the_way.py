@@ -19,11 +19,11 @@ from adversarial_lcd_ros.sequences.bag_truth import TRUTH_FILE, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import (
     COMPRESSED_IMAGE,
     IMAGE,
-    METADATA,
     PAYLOAD,
     BagFile,
     is_bag,
 )
+from adversarial_lcd_ros.sequences.damage import METADATA
 from adversarial_lcd_ros.sequences.importing import (
     GROUND_TRUTH_TOPIC,
     IMAGE_TOPIC,

@@ -22,14 +22,8 @@ from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, SequenceError
 from adversarial_lcd_ros.paths import PACKAGE
 from adversarial_lcd_ros.payload import unwrap
-from adversarial_lcd_ros.sequences.bagfile import (
-    COMPRESSED_IMAGE,
-    IMAGE,
-    PAYLOAD,
-    POSE,
-    BagFile,
-    BagWriter,
-)
+from adversarial_lcd_ros.sequences.bagfile import PAYLOAD, POSE, BagFile, BagWriter
+from adversarial_lcd_ros.sequences.bags import camera_topics, described_topics
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 from adversarial_lcd_ros.sequences.sequence import check_order
 from adversarial_lcd_ros.sequences.stamps import frame_stamps
@@ -135,19 +129,18 @@ class Replay:
 
 
 def _frame_topic(bag: BagFile) -> str:
-    images = bag.of_type(IMAGE, COMPRESSED_IMAGE)
-    if len(images) > 1:
-        raise SequenceError(f'bag {bag.path} has images on {", ".join(images)}: make a bag of one '
-                            'with "adversarial-lcd import"')
-    if images:
-        return images[0]
+    cameras = camera_topics(bag)
+    if len(cameras) > 1:
+        raise SequenceError(f'bag {bag.path} has images on {", ".join(cameras)}: make a bag of '
+                            'one with "adversarial-lcd import"')
+    if cameras:
+        return cameras[0]
     graphs = {_name(topic): topic for topic in bag.of_type(PAYLOAD)}
     for name in GRAPH_TOPICS:
         if name in graphs:
             return graphs[name]
-    there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(bag.topics.items()))
-    raise SequenceError(f'bag {bag.path} has neither images nor graphs to replay; it has '
-                        f'{there or "no topics"}')
+    raise SequenceError(f'bag {bag.path} has neither images of a camera nor graphs to replay; it '
+                        f'has {described_topics(bag)}')
 
 
 def _frame_stamps(bag: BagFile, topic: str) -> NDArray[np.int64]:

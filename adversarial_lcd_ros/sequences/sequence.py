@@ -69,6 +69,12 @@ class Sequence:
         Returns an iterator of the frames of these numbers; use ``frames``.
     detections : Path or None
         Where the frames have no pictures: the file of what was detected in them.
+    focal_length_px : float or None
+        Of the camera, pixels, where the recording says it.
+    frame_names : tuple of str
+        Of the files of the frames, without their suffixes, where frames are files.
+    notes : tuple of str
+        What was chosen or left out on opening, a line each.
     truth : str
         In words: where the ground truth is from, or why there is none.
 
@@ -86,6 +92,9 @@ class Sequence:
     trajectory: Trajectory | None
     read: Callable[[range], Iterator[Frame]]
     detections: Path | None = None
+    focal_length_px: float | None = None
+    frame_names: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     truth: str = ''
 
     def __post_init__(self) -> None:

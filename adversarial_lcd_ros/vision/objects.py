@@ -15,12 +15,16 @@ import onnxruntime
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.vision import heads
 
 # RGB, for grey levels from 0 to 1.
 IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
 IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 NMS_IOU = 0.45
 LETTERBOX_GREY = 114
+_EXPECTED = ('expected a PaddleDetection export (image, scale_factor) or one of YOLOv8 or later '
+             'for detection, in float32 (of YOLOv5 to 7: export it with suppression inside, rows '
+             'of x1 y1 x2 y2 score class), or write its detections as CSV for the detector "csv"')
 
 COCO_CLASSES = (
     'person', 'bicycle', 'car', 'motorcycle', 'airplane', 'bus', 'train', 'truck', 'boat',
@@ -104,6 +108,8 @@ class ObjectDetector:
     x1, y1, x2, y2) and exports of the YOLO family, version 8 and later: a raw head
     (1, 4 + classes, boxes), or (1, boxes, 6) with suppression inside (rows of x1, y1, x2, y2,
     score, class). The size of the input must be fixed, or be named in the model's metadata.
+    Shapes alone do not tell these from heads that mean something else by the same numbers:
+    what scores, classes and boxes cannot be is refused.
 
     Parameters
     ----------
@@ -117,7 +123,7 @@ class ObjectDetector:
     Raises
     ------
     ModelError
-        The model is missing, damaged, or of none of these kinds.
+        The model is missing, damaged, or of none of these kinds, by shape or by values.
 
     """
 
@@ -155,7 +161,8 @@ class ObjectDetector:
         Raises
         ------
         ModelError
-            The network fails, or its output has another shape than its kind has.
+            The network fails, or its output has another shape than its kind has, or values that
+            its kind cannot have.
 
         """
         return self._run(image)
@@ -176,7 +183,7 @@ class ObjectDetector:
         if floats and len(inputs) == len(outputs) == 1 and len(shape) == 3:
             (self._input, entry), = inputs.items()
             self._size = self._input_size(entry.shape)
-            if shape[2] == 6:
+            if shape[2] == 6 and not heads.is_grid(shape[1], self._size):
                 return self._yolo_end_to_end
             # Older heads, (1, boxes, 5 + classes), are the other way round.
             rows, columns = shape[1:]
@@ -185,8 +192,14 @@ class ObjectDetector:
                 return self._yolo_raw
         found = ', '.join(f'{entry.name} {entry.type}{entry.shape}'
                           for entry in (*inputs.values(), *outputs))
-        raise ModelError(f'{self._model}: found {found}; expected a PaddleDetection export '
-                         '(image, scale_factor) or one of YOLOv8 or later, in float32')
+        raise ModelError(f'{self._model}: found {found}; {_EXPECTED}')
+
+    def _check(self, *problems: str) -> None:
+        """Refuse a model whose numbers have a problem."""
+        found = next(filter(None, problems), '')
+        if found:
+            raise ModelError(f'{self._model}: output {self._output} has {found}: it is a head of '
+                             f'another kind; {_EXPECTED}')
 
     def _input_size(self, shape: list[int | str]) -> tuple[int, int]:
         """Return width and height of the network's input, from its shape or its metadata."""
@@ -226,7 +239,9 @@ class ObjectDetector:
         found = self._infer({'image': tensor[None], 'scale_factor': np.array(
             [[rows / height, columns / width]], np.float32)}, (None, 6))
         # A row of class -1 stands for "nothing found".
-        found = found[(found[:, 1] >= self._score) & (found[:, 0] >= 0)]
+        found = found[~(found[:, 0] < 0)]
+        self._check(heads.wrong_scores(found[:, 1]))
+        found = found[found[:, 1] >= self._score]
         return Detections.of(found[:, 0], found[:, 2:6], found[:, 1], width, height)
 
     def _letterboxed(self, image: NDArray[np.uint8], shape: tuple[int | None, ...]
@@ -246,9 +261,11 @@ class ObjectDetector:
     def _yolo_raw(self, image: NDArray[np.uint8]) -> Detections:
         head, scale, offset = self._letterboxed(image, (1, None, None))
         label, score = head[4:].argmax(axis=0), head[4:].max(axis=0)
+        self._check(heads.wrong_scores(head[4:].ravel()))
         sure = np.flatnonzero(score >= self._score)
         label, score = label[sure], score[sure]
         centre, size = head[:2, sure].T, head[2:4, sure].T
+        self._check(heads.wrong_pixels(np.hstack([centre, size])))
         # Classes lie side by side, too far apart to overlap: one is not suppressed by another.
         apart = centre - size / 2 + 2 * max(self._size) * label[:, None]
         kept = np.asarray(cv2.dnn.NMSBoxes(np.hstack([apart, size]).tolist(), score.tolist(), 0.0,
@@ -258,8 +275,11 @@ class ObjectDetector:
 
     def _yolo_end_to_end(self, image: NDArray[np.uint8]) -> Detections:
         rows, scale, offset = self._letterboxed(image, (1, None, 6))
+        self._check('a row for each cell' if heads.is_grid(len(rows), self._size) else '',
+                    heads.wrong_scores(rows[:, 4]), heads.wrong_classes(rows[:, 5]))
         rows = rows[rows[:, 4] >= self._score]
-        return self._unboxed(rows[:, 5], rows[:, :4], rows[:, 4], image, scale, offset)
+        self._check(heads.wrong_corners(rows[:, :4]))
+        return self._unboxed(np.round(rows[:, 5]), rows[:, :4], rows[:, 4], image, scale, offset)
 
     @staticmethod
     def _unboxed(label: NDArray[Any], corners: NDArray[Any], score: NDArray[Any],
