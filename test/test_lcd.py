@@ -285,7 +285,8 @@ def test_a_folder_of_trained_targets_serves_each(tmp_path):
             tmp_path / f'target_{target}.json')
         detector = LoopClosureDetector(LcdConfig(target=target, model=str(tmp_path)))
         assert detector.decision.bias == bias
-    with pytest.raises(ModelError, match=r'target_wl\.json is no trained decision'):
+    with pytest.raises(ModelError, match='has no decision for the target wl; those trained there: '
+                                         'descriptors, vbow'):
         LoopClosureDetector(LcdConfig(model=str(tmp_path)))
 
 
