@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('attacker'))
+
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-import sys
 from threading import Condition, Thread
 import time
 import traceback
@@ -53,6 +57,7 @@ class AttackerNode(PipelineNode):
         config, self._node_config = self.settings
         self._refuse_loop()
         self._attacker = Attacker(config)
+        self.say('compiling')
         load_for_attacker(config)
         self._oracle = TopicOracle(self, self.diagnostics, self._node_config.query_timeout_s)
         self._reports = create_payload_publisher(self, 'attack_report')
@@ -169,7 +174,3 @@ class AttackerNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(AttackerNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('bag_replay'))
+
 from collections.abc import Callable, Sequence
 import importlib
 from pathlib import Path
-import sys
 import time
 from typing import Any
 
@@ -247,7 +251,3 @@ class BagReplayNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(BagReplayNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

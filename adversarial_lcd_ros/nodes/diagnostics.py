@@ -27,6 +27,8 @@ class Diagnostics:
     ----------
     gauges : dict of str to callable
         Further values, read when a status goes out.
+    state : str
+        What the node does before it takes messages; empty from then on.
     waiting_for : str
         What the node cannot start without; empty once it is there.
 
@@ -39,7 +41,7 @@ class Diagnostics:
         self._counts: Counter[str] = Counter()
         self._latency_s: deque[float] = deque(maxlen=_KEPT_LATENCIES)
         self.gauges: dict[str, Callable[[], Any]] = {}
-        self.waiting_for = ''
+        self.state = self.waiting_for = ''
         self._last_counts: Counter[str] = Counter()
         self._last_s = time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, TOPIC, 10)
@@ -98,6 +100,8 @@ class Diagnostics:
     def _message(self, refused: int) -> str:
         if refused:
             return f'{refused} messages refused in the last second'
+        if self.state:
+            return self.state
         return f'waiting for {self.waiting_for}' if self.waiting_for else 'ok'
 
     def _values(self, counts: Counter[str], new: Counter[str],

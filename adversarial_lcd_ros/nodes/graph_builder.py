@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('graph_builder'))
+
 from array import array
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-import sys
 import time
 from typing import Any
 
@@ -193,7 +197,3 @@ class GraphBuilderNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(GraphBuilderNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('lcd'))
+
 from collections.abc import Sequence
-import sys
 import time
 from typing import Any
 
@@ -39,6 +43,7 @@ class LcdNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.detector = LoopClosureDetector(self.settings[0])
+        self.say('compiling')
         load_for_detector(self.settings[0])
         self._decisions = create_payload_publisher(self, 'loop_closures')
         self._answers = create_payload_publisher(self, 'answer')
@@ -75,7 +80,3 @@ class LcdNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(LcdNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())
