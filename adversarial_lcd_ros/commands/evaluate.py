@@ -34,6 +34,9 @@ from adversarial_lcd_ros.settings import (
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
 LIVE_WINDOW = 4
+# A node that hangs, or refused a frame, is noticed: until then any attack may take its time, also
+# on a machine that is busy with other work.
+LIVE_TIMEOUT_S = 600.0
 # A class, and what its options start with where another class of the command has the name too.
 EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
              (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
@@ -125,7 +128,7 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
     plan = Plan(config_from_options(options, BuilderConfig),
                 config_from_options(options, LcdConfig),
                 config_from_options(options, LabelConfig),
-                replace(ReplayConfig(window=LIVE_WINDOW),
+                replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
                 attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,

@@ -22,11 +22,13 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError, ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
+from adversarial_lcd_ros.nodes.peers import Strangers, getting_ready
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
+from adversarial_lcd_ros.start import report
 
 GRAPHS = CLEAN, _ = 'graph_clean', 'graph'
 DECISIONS, REPORTS = 'loop_closures', 'attack_report'
@@ -37,6 +39,9 @@ _SPIN_S = 0.1
 # The other ends have matched as seen from here; this is for them to see it too, and each other.
 # A quarter of a second was too short once on a busy machine: the first graph was lost.
 _SETTLE_S = 1.0
+_LOOK_PERIOD_S = 1.0
+# What a supervisor is told once the other nodes are there.
+_PLAYING = 'playing'
 
 
 class Stopped(Exception):  # noqa: N818
@@ -71,6 +76,8 @@ class BagReplayNode(PipelineNode):
             topic: MirroredSubscription(self, UInt8MultiArray, topic, self._handler(topic),
                                         raw=True)
             for topic in (RECORDED if self._recorder else (DECISIONS,))}
+        self._strangers = Strangers(self, RECORDED)
+        self._look_due_s = 0.0
         self._under_way: dict[int, float] = {}
         self._published = self._decided = self._time_ns = 0
         self._origin: tuple[float, int] | None = None
@@ -90,6 +97,7 @@ class BagReplayNode(PipelineNode):
         def on_message(wire: bytes) -> None:
             self.diagnostics.count(f'received {topic}')
             if self._recorder:
+                self._strangers.heard(topic, wire)
                 self._recorder.write(topic, WIRE_TYPE, self._time_ns, wire)
             if topic == DECISIONS:
                 self._on_decision(wire)
@@ -111,6 +119,7 @@ class BagReplayNode(PipelineNode):
         self._spin = spin
         try:
             self._await_listeners()
+            report(_PLAYING)
             began_s = time.monotonic()
             with progress(self.default_name, self._replay.frame_count) as show:
                 self._play(show)
@@ -139,6 +148,7 @@ class BagReplayNode(PipelineNode):
             self._time_ns = stamp_ns
             if is_frame:
                 self._under_way[stamp_ns] = time.monotonic()
+                self._strangers.sent(stamp_ns)
                 self._published += 1
             self._outputs[topic].publish(cdr)
             self.diagnostics.count('published messages')
@@ -147,6 +157,16 @@ class BagReplayNode(PipelineNode):
     def _turn(self, seconds: float) -> None:
         if not self._spin(seconds):
             raise Stopped
+        if self._recorder:
+            self._refuse_strangers()
+
+    def _refuse_strangers(self) -> None:
+        """Fail where others are on the topics: what is recorded would be theirs, too."""
+        if time.monotonic() >= self._look_due_s:
+            self._look_due_s = time.monotonic() + _LOOK_PERIOD_S
+            self._strangers.look()
+        if self._strangers.found:
+            raise EvaluationError(self._strangers.found)
 
     def _until(self, condition: Callable[[], bool]) -> bool:
         """Run callbacks until the condition holds; False after timeout_s."""
@@ -159,19 +179,25 @@ class BagReplayNode(PipelineNode):
 
     def _await_listeners(self) -> None:
         """Wait until the first frame will be heard, all along the pipeline."""
-        settled_s = time.monotonic() + _SETTLE_S
-
-        def settled() -> bool:
-            nonlocal settled_s
+        limit_s = self._config.start_timeout_s
+        waited_since_s = settled_since_s = look_s = time.monotonic()
+        while True:
+            now_s = time.monotonic()
             self.diagnostics.waiting_for = self._missing()
             if self.diagnostics.waiting_for:
-                settled_s = time.monotonic() + _SETTLE_S
-            return time.monotonic() >= settled_s
-
-        if not self._until(settled):
-            raise EvaluationError(
-                f'no {self.diagnostics.waiting_for} within {self._config.timeout_s:g} s: are the '
-                'other nodes running, and remapped alike?')
+                settled_since_s = now_s
+            elif now_s - settled_since_s >= _SETTLE_S:
+                return
+            if now_s >= look_s:
+                look_s = now_s + _LOOK_PERIOD_S
+                # Whoever is loading or compiling is waited for: that takes what it takes.
+                if getting_ready(self):
+                    waited_since_s = now_s
+            if limit_s and now_s - waited_since_s >= limit_s:
+                raise EvaluationError(
+                    f'no {self.diagnostics.waiting_for} within {limit_s:g} s: are the other '
+                    'nodes running, and remapped alike?')
+            self._turn(_SPIN_S)
 
     def _missing(self) -> str:
         """Tell what is not there yet; empty when all is."""
