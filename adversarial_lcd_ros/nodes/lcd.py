@@ -16,7 +16,6 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.nodes.compiled import load_for_detector
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -24,6 +23,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
 )
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.preloading import load_for_detector
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 

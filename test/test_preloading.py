@@ -6,7 +6,7 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 
-compiled = pytest.importorskip('adversarial_lcd_ros.nodes.compiled')
+compiled = pytest.importorskip('adversarial_lcd_ros.preloading')
 
 
 @pytest.mark.parametrize('target', ['wl', 'anchored', 'objects', 'vbow'])
