@@ -9,10 +9,10 @@ import sys
 
 from adversarial_lcd_ros.commands import evaluate_frames
 from adversarial_lcd_ros.commands.common import (
-    TABLE_WIDTH,
     Commands,
     add_command,
     add_json_option,
+    make_console,
     print_json,
     tell,
 )
@@ -112,8 +112,6 @@ def _demo(options: Namespace) -> None:
 
 
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
-    from rich.console import Console
-
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
@@ -136,8 +134,7 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
         return
-    # Where there is no terminal there is no width to keep to.
-    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
+    console = make_console()
     console.print(figure_table(summary))
     console.print(decline_table(summary))
     if options.sweep_labels:

@@ -8,6 +8,7 @@ from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.commands import (
     build,
     compare,
+    compiling,
     evaluate,
     fetch_model,
     importing,
@@ -27,6 +28,7 @@ def make_parser() -> ArgumentParser:
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                compare.add, targets.add, train.add, fetch_model.add, inspect.add, params.add):
+                compare.add, targets.add, train.add, fetch_model.add, compiling.add,
+                inspect.add, params.add):
         add(commands)
     return parser

@@ -32,6 +32,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.preloading import load_for_builder
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.detections import MISSED, DetectionInbox
@@ -72,6 +73,8 @@ class GraphBuilderNode(PipelineNode):
         super().__init__(**options)
         config, node_config = self.settings
         self._builder = GraphBuilder(config, node_config.frames_at_once)
+        self.say('compiling')
+        load_for_builder()
         self._frames_at_once = node_config.frames_at_once
         self._under_way: deque[_Frame] = deque()
         # Publishes in this node's own thread what a thread of the network has finished.

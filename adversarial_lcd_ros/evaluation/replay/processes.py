@@ -16,6 +16,7 @@ from adversarial_lcd_ros.codec import (
     decode_graph,
     decode_loop_closure,
 )
+from adversarial_lcd_ros.compiled.caching import code_folder
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.evaluation.replay.domain import VARIABLE
 from adversarial_lcd_ros.evaluation.replay.supervision import (
@@ -107,7 +108,7 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
         for name, remaps in nodes.items():
             running.append(NodeProcess(
                 name, ['--ros-args', '--params-file', str(parameters), *remaps],
-                environment(domain), folder / f'{name}.log',
+                environment(domain, folder.parent / 'compiled'), folder / f'{name}.log',
                 keep_stderr=name == 'bag_replay'))
         await_end(running[-1], running[:-1], tell)
     return read_recording(folder, attacked=setup.attack is not None)
@@ -124,9 +125,19 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
-def environment(domain: int) -> Mapping[str, str]:
-    """Return the environment of the nodes: on this machine only, in a domain of their own."""
-    return {**os.environ,
+def environment(domain: int, spare: Path | None = None) -> Mapping[str, str]:
+    """
+    Return the environment of the nodes: on this machine only, in a domain of their own.
+
+    Parameters
+    ----------
+    domain : int
+    spare : Path, optional
+        Folder for compiled code where it can be kept nowhere else.
+
+    """
+    kept = {'NUMBA_CACHE_DIR': str(spare.resolve())} if spare and code_folder() is None else {}
+    return {**os.environ, **kept,
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
             VARIABLE: str(domain),
             'FASTRTPS_DEFAULT_PROFILES_FILE': str(share_path('config/fastdds.xml')),
