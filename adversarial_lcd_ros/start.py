@@ -22,8 +22,6 @@ EXIT_OK, EXIT_USAGE = 0, 2
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Process id of whoever started this node and waits for it, and where he reads how it is going.
 SUPERVISOR = 'ADVERSARIAL_LCD_SUPERVISOR'
-NO_ROS = ('rclpy is not installed: source a ROS 2 installation, or take it from PyPI with '
-          'pip install "adversarial_lcd_ros[ros]"')
 _GRACE_S = 1.5
 _PR_SET_PDEATHSIG = 1
 _PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x'}
@@ -129,9 +127,9 @@ def run_node_process(name: str) -> int:
     try:
         end_with_supervisor()
         write_plainly()
-        if importlib.util.find_spec('rclpy') is None:
-            print(f'{name}: {NO_ROS}', file=sys.stderr)
-            return EXIT_USAGE
+        problem = ros_problem()
+        if problem:
+            return _refuse(name, problem)
         report('loading')
         code: int = importlib.import_module(f'adversarial_lcd_ros.nodes.{name}').main()
         return code
@@ -139,6 +137,27 @@ def run_node_process(name: str) -> int:
         return EXIT_OK
     finally:
         ignore_signals()
+
+
+def ros_problem() -> str:
+    """Return why there is no ROS 2 here, and what to do, in one line; empty if there is."""
+    remedy = ('source a ROS 2 installation, or take the libraries from PyPI: pip install '
+              '"adversarial_lcd_ros[ros]"')
+    if importlib.util.find_spec('rclpy') is None:
+        return f'rclpy, the library of ROS 2 for Python, is not installed: {remedy}'
+    try:
+        importlib.import_module('rclpy')
+        importlib.import_module('diagnostic_msgs')
+    except ImportError as error:
+        reason = str(error).splitlines()[0]
+        return f'ROS 2 is not complete here ({reason}): {remedy}'
+    return ''
+
+
+def _refuse(name: str, problem: str) -> int:
+    if not report(f'error {problem}'):
+        print(f'{name}: {problem}', file=sys.stderr)
+    return EXIT_USAGE
 
 
 def attacker() -> int:

@@ -30,6 +30,7 @@ from adversarial_lcd_ros.settings import (
     chosen_settings,
     config_from_options,
 )
+from adversarial_lcd_ros.start import ros_problem
 
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
@@ -112,6 +113,10 @@ def _demo(options: Namespace) -> None:
 
 
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
+    problem = ros_problem()
+    if problem:
+        raise ConfigError(problem)
+
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
     from adversarial_lcd_ros.evaluation.replay.summary import as_document

@@ -7,6 +7,7 @@ from argparse import ArgumentParser
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.commands import (
     build,
+    clean,
     compare,
     compiling,
     evaluate,
@@ -28,7 +29,7 @@ def make_parser() -> ArgumentParser:
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                compare.add, targets.add, train.add, fetch_model.add, compiling.add,
+                compare.add, targets.add, train.add, fetch_model.add, compiling.add, clean.add,
                 inspect.add, params.add):
         add(commands)
     return parser

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import importlib
 import importlib.util
+import os
+from pathlib import Path
 import signal
 import sys
 from threading import Event
@@ -30,6 +32,7 @@ from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
 from adversarial_lcd_ros.start import SIGNALS, ignore_signals, interruptible, report
 
 EXIT_OK, EXIT_ERROR, EXIT_USAGE = 0, 1, 2
+NO_LOG_FILES = ['--ros-args', '--disable-external-lib-logs', '--']
 # What a node says once it takes messages.
 READY = 'ready'
 _SPIN_S = 0.1
@@ -126,7 +129,7 @@ def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) 
     try:
         _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
         # rclpy's own handlers shut the context down under a callback that is publishing.
-        rclpy.init(args=arguments, context=context,
+        rclpy.init(args=[*arguments, *_without_log_files(arguments)], context=context,
                    signal_handler_options=SignalHandlerOptions.NO)
         return _live(node_class, context, own_process)
     except KeyboardInterrupt:  # before the node was ready
@@ -143,6 +146,25 @@ def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) 
         if own_process:
             ignore_signals()
         context.try_shutdown()
+
+
+def _without_log_files(arguments: Sequence[str]) -> list[str]:
+    """Return arguments that keep rclpy from log files where there is no place for them."""
+    if NO_LOG_FILES[1] in arguments:
+        return []
+    chosen, home = os.environ.get('ROS_LOG_DIR'), os.environ.get('ROS_HOME')
+    try:
+        place = Path(chosen or home or '~/.ros').expanduser()
+    except RuntimeError:  # no home
+        place = None
+    # rclpy makes the folder; what must be there, and be open to writing, is a folder above it.
+    while place and not place.exists() and place != place.parent:
+        place = place.parent
+    if place and os.access(place, os.W_OK):
+        return []
+    print('no log files are kept: set ROS_LOG_DIR to a folder that can be written',
+          file=sys.stderr)
+    return NO_LOG_FILES
 
 
 def _live(node_class: type[PipelineNode], context: Context, own_process: bool) -> int:

@@ -107,7 +107,9 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
     with ended_together(running):
         for name, remaps in nodes.items():
             running.append(NodeProcess(
-                name, ['--ros-args', '--params-file', str(parameters), *remaps],
+                # What they log is kept with the run, and not below the user's home.
+                name, ['--ros-args', '--disable-external-lib-logs', '--params-file',
+                       str(parameters), *remaps],
                 environment(domain, folder.parent / 'compiled'), folder / f'{name}.log',
                 keep_stderr=name == 'bag_replay'))
         await_end(running[-1], running[:-1], tell)

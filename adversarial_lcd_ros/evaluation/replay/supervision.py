@@ -74,6 +74,11 @@ class NodeProcess:
         finally:
             os.close(theirs)
 
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
     def poll(self) -> int | None:
         """Take in what it reported; return its exit code, None while it lives."""
         code = self._process.poll()
