@@ -99,9 +99,9 @@ class NodeProcess:
                 self.state = line
 
     def interrupt(self) -> None:
-        """Ask it to end."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+        """Ask it to end; by force where it is not yet able to hear that."""
+        if self.poll() is None:
+            self._process.send_signal(signal.SIGKILL if self.state == STARTING else signal.SIGINT)
 
     def end(self, deadline_s: float) -> int:
         """Wait until it has ended, kill it at a time of the monotonic clock; return its code."""
