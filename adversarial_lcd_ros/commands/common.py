@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+import os
 import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -51,7 +52,7 @@ def print_rows(title: str, rows: Sequence[Mapping[str, str]]) -> None:
 
 def make_console(*, stderr: bool = False) -> Console:
     """
-    Return what prints tables and figures, as wide as the terminal; without one, 150 columns.
+    Return what prints tables and figures, as wide as the terminal or COLUMNS, else 150 columns.
 
     Brackets and colons in names are what they are: no markup, no emoji.
     """
@@ -59,7 +60,8 @@ def make_console(*, stderr: bool = False) -> Console:
 
     stream = sys.stderr if stderr else sys.stdout
     # Where there is no terminal there is no width to keep to.
-    return Console(width=None if stream.isatty() else TABLE_WIDTH, stderr=stderr, markup=False,
+    known = stream.isatty() or 'COLUMNS' in os.environ
+    return Console(width=None if known else TABLE_WIDTH, stderr=stderr, markup=False,
                    emoji=False, highlight=False)
 
 
