@@ -227,9 +227,8 @@ class ReplayConfig(Config):
         1, 'How often the bag is replayed; stamps go on rising.', low=1, high=1_000_000)
     clock: bool = setting(True, 'Publish /clock.')
     start_timeout_s: float = setting(
-        30.0, 'Wait so long for the other nodes at the start, seconds; the time in which one '
-        'of them is loading or compiling does not count. 0: as long as it takes.', low=0.0,
-        high=1e6)
+        30.0, 'Wait so long for the other nodes at the start, seconds, and anew while one of '
+        'them is loading or compiling. 0: as long as it takes.', low=0.0, high=1e6)
     timeout_s: float = setting(
         30.0, 'In lockstep wait so long for a decision, and at the end for the rest, seconds.',
         low=0.1, high=1e6)
