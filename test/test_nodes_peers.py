@@ -1,5 +1,8 @@
 """The replay waits for nodes that get ready, and notices those that are none of its own."""
 
+import time
+from types import SimpleNamespace
+
 import pytest
 
 from adversarial_lcd_ros import codec
@@ -42,24 +45,24 @@ def test_nodes_that_get_ready_are_told_from_those_that_are(ros, lcd_model, bag):
 
 def test_a_node_that_gets_ready_is_waited_for_beyond_the_limit(
         ros, bag, vocabulary, lcd_model, monkeypatch):  # noqa: F811
-    node = replay(ros, bag, lockstep=True, start_timeout_s=10)
+    node = replay(ros, bag, lockstep=True, start_timeout_s=60)
     slow = ros.start(Starting)
     ros.until(lambda: getting_ready(node))
-    now_s = 0.0
+    real_s, ahead_s = time.monotonic, 0.0
 
     def spin(seconds):
-        nonlocal now_s
-        # A clock of its own, fast until the others are ready: no test waits for a limit.
-        now_s += 5.0 if now_s < 200.0 else 0.05
-        if now_s == 200.0:
-            Pipeline(ros, vocabulary, lcd_model)
-            ros.stop(slow)
+        nonlocal ahead_s
+        if ahead_s < 600.0:
+            ahead_s += 30.0  # no test waits for a limit
+            if ahead_s == 600.0:
+                Pipeline(ros, vocabulary, lcd_model)
+                ros.stop(slow)
         return ros.spin(seconds)
 
-    with monkeypatch.context() as patch:
-        patch.setattr('adversarial_lcd_ros.nodes.bag_replay.time.monotonic', lambda: now_s)
-        assert node.work(spin) == 0
-    assert now_s > 200.0
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.bag_replay.time',
+                        SimpleNamespace(monotonic=lambda: real_s() + ahead_s))
+    assert node.work(spin) == 0
+    assert ahead_s == 600.0
 
 
 def test_a_second_detector_fails_a_recording_and_is_named(
