@@ -180,7 +180,7 @@ class BagReplayNode(PipelineNode):
     def _await_listeners(self) -> None:
         """Wait until the first frame will be heard, all along the pipeline."""
         limit_s = self._config.start_timeout_s
-        waited_since_s = settled_since_s = time.monotonic()
+        waited_since_s = settled_since_s = looked_s = time.monotonic()
         while True:
             now_s = time.monotonic()
             self.diagnostics.waiting_for = self._missing()
@@ -188,10 +188,13 @@ class BagReplayNode(PipelineNode):
                 settled_since_s = now_s
             elif now_s - settled_since_s >= _SETTLE_S:
                 return
-            if limit_s and now_s - waited_since_s >= limit_s:
+            late = bool(limit_s) and now_s - waited_since_s >= limit_s
+            if late or now_s - looked_s >= _LOOK_PERIOD_S:
+                looked_s = now_s
                 # Whoever is loading or compiling is waited for anew: that takes what it takes.
-                waited_since_s = now_s
-                if not getting_ready(self):
+                if getting_ready(self):
+                    waited_since_s = now_s
+                elif late:
                     raise EvaluationError(
                         f'no {self.diagnostics.waiting_for} within {limit_s:g} s: are the other '
                         'nodes running, and remapped alike?')
