@@ -65,7 +65,7 @@ model: $(INSTALLED) $(COMPILED)
 # What changes no compiled function is loaded again at once.
 $(COMPILED): $(INSTALLED)
 	@echo 'compiling (half a minute, once)'
-	@$(BIN)/adversarial-lcd compile >/dev/null 2>&1
+	@$(BIN)/adversarial-lcd compile >/dev/null
 	@touch $@
 
 # With ROS 2 sourced its own rclpy is used; otherwise PyPI's wheels of ROS 2 Jazzy are.

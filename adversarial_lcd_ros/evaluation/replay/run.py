@@ -150,19 +150,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
                                       tell).run()
         tell('labels, figures and pictures')
         clean = runs.pop(CLEAN)
-        labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in clean.clean],
-                              sequence.image_size, plan.labels)
-        records = make_records(labels, clean.decisions, {
-            name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
-        summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
-            [graph.node_count for graph in clean.clean],
-            [graph.edge_count for graph in clean.clean]), plan.seed)
-        summary['graphs_rebuilt_differently'] = {
-            name: _differing(clean.clean, run.clean) for name, run in runs.items()}
+        records, summary = _figures(sequence, clean, runs, plan)
         if plan.sweep_labels:
-            tell('labels with other thresholds')
-            summary['label_sweep'] = sweep_labels(records, sequence.trajectory,
-                                                  sequence.image_size, plan.labels)
             write_sweep(folder.path / SWEEP, summary['label_sweep'])
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
         _write(folder, plan, summary, records, command_line, domain,
@@ -170,6 +159,27 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
         return folder.finish(), summary
+
+
+def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
+             runs: Mapping[str, Recording], plan: Plan
+             ) -> tuple[list[QueryRecord], dict[str, Any]]:
+    """Return the records of all runs, and what they come to."""
+    trajectory = sequence.trajectory
+    assert trajectory is not None
+    labels = label_frames(trajectory, [graph.stamp_ns for graph in clean.clean],
+                          sequence.image_size, plan.labels)
+    records = make_records(labels, clean.decisions, {
+        name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
+    summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
+        [graph.node_count for graph in clean.clean],
+        [graph.edge_count for graph in clean.clean]), plan.seed)
+    summary['graphs_rebuilt_differently'] = {
+        name: _differing(clean.clean, run.clean) for name, run in runs.items()}
+    if plan.sweep_labels:
+        summary['label_sweep'] = sweep_labels(records, trajectory, sequence.image_size,
+                                              plan.labels)
+    return records, summary
 
 
 @contextmanager
