@@ -149,8 +149,9 @@ def test_a_node_that_is_interrupted_before_it_is_ready_ends_with_0(tmp_path, sta
 def test_code_that_swallows_the_interrupt_is_cut_off():
     process = subprocess.Popen(
         [sys.executable, '-c', 'from adversarial_lcd_ros.start import interruptible\n'
-         'interruptible(130)\nprint("ready", flush=True)\nimport time\n'
-         'try:\n    time.sleep(600)\nexcept KeyboardInterrupt:\n    time.sleep(600)'],
+         'import time\ninterruptible(130)\ntry:\n'
+         '    print("ready", flush=True)\n    time.sleep(600)\n'
+         'except KeyboardInterrupt:\n    time.sleep(600)'],
         env=environment(), stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == 'ready\n'
     process.send_signal(signal.SIGINT)
