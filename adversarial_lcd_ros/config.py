@@ -13,20 +13,33 @@ import math
 from typing import Any, ClassVar, TypeVar
 
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.registry import (
+    DEFENCES,
+    NONE,
+    PERTURBATIONS,
+    SEARCHES,
+    SURROGATES,
+    TARGETS,
+    Table,
+)
 
-TARGETS = ('wl', 'edges', 'anchored', 'descriptors', 'vbow', 'objects', 'wl_exact', 'gnn')
-PERTURBATIONS = ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip', 'recall')
-SURROGATES = ('svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes', 'svr', 'ard', 'none')
 MODES = ('query', 'surrogate', 'pass')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
 
 def setting(default: Any, help: str, *, low: float | None = None, high: float | None = None,
-            choices: tuple[str, ...] | None = None) -> Any:
-    """Return a dataclass field with what is needed to check and to explain it."""
-    return field(default=default, metadata={'help': help, 'low': low, 'high': high,
-                                            'choices': choices})
+            choices: tuple[str, ...] | Table | None = None, several: bool = False,
+            empty: bool = False) -> Any:
+    """
+    Return a dataclass field with what is needed to check and to explain it.
+
+    Choices are values, or a table of classes; ``several`` takes names of it between commas,
+    ``empty`` none as well.
+    """
+    return field(default=default, metadata={
+        'help': help, 'low': low, 'high': high, 'choices': choices, 'several': several,
+        'empty': empty})
 
 
 @dataclass(frozen=True)
@@ -72,7 +85,9 @@ def _check(owner: str, entry: Field[Any], value: Any) -> None:
         raise ConfigError(f'{owner}.{entry.name} = {value!r}: expected {expected.__name__}, '
                           f'found {type(value).__name__}')
     low, high, choices = (entry.metadata[key] for key in ('low', 'high', 'choices'))
-    if choices is not None and value not in choices:
+    if isinstance(choices, Table):
+        _check_names(f'{owner}.{entry.name}', entry, choices, value)
+    elif choices is not None and value not in choices:
         raise ConfigError(f'{owner}.{entry.name} = {value!r}: expected one of '
                           f'{", ".join(choices)}')
     if isinstance(value, float) and not math.isfinite(value):
@@ -80,6 +95,21 @@ def _check(owner: str, entry: Field[Any], value: Any) -> None:
     if (low is not None and value < low) or (high is not None and value > high):
         raise ConfigError(f'{owner}.{entry.name} = {value}: expected {low} to '
                           f'{"any" if high is None else high}')
+
+
+def _check_names(what: str, entry: Field[Any], table: Table, value: Any) -> None:
+    if not value and entry.metadata['empty']:
+        return
+    for name in names_in(value) if entry.metadata['several'] else [value]:
+        try:
+            table.check(name)
+        except ConfigError as error:
+            raise ConfigError(f'{what} = {value!r}: {error}') from error
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names in a setting that takes several, between commas."""
+    return [name.strip() for name in text.split(',')]
 
 
 @dataclass(frozen=True)
@@ -142,8 +172,12 @@ class LcdConfig(Config):
         'before and after it.', low=0, high=20)
     threshold: float = setting(
         0.5, 'A loop closure is declared from this probability on.', low=0.0, high=1.0)
+    defences: str = setting(
+        NONE, 'What stands between graphs and decisions; several, in their order, between commas.',
+        choices=DEFENCES, several=True)
     geometric_check: bool = setting(
-        False, 'Declare a loop only if the features of both frames agree on one camera motion.')
+        False, 'Declare a loop only if the features of both frames agree on one camera motion: '
+        'short for the defence of that name.')
     geometric_inliers: int = setting(
         20, 'Geometric check: least matches that agree; the default is for graphs of about 300 '
         'features.', low=8, high=100_000)
@@ -164,13 +198,15 @@ class AttackConfig(Config):
     title: ClassVar[str] = 'attacker'
 
     mode: str = setting(
-        'query', 'query: query-guided; surrogate: no queries, by a surrogate trained beforehand; '
-        'pass: forward unchanged.', choices=MODES)
+        'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
+        'beforehand; pass: forward unchanged.', choices=MODES)
+    search: str = setting(
+        'stepwise', 'How flips are looked for: flip after flip as in the paper, or by our own '
+        'recall.', choices=SEARCHES)
     perturbation: str = setting(
-        'eigencentrality', 'How candidate flips are chosen; recall is our own and the others are '
-        'those of the paper.', choices=PERTURBATIONS)
+        'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
-        'svm_rbf', 'Model that predicts the attack loss of a perturbed graph.',
+        'svm_rbf', 'Stepwise: model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
     gamma: str = setting(
         'paper', 'Width of the kernels rbf and poly: 1 / (2 sigma^2) as in Eq. (8), or '

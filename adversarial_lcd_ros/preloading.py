@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.codec import LcdAnswer
-from adversarial_lcd_ros.config import PERTURBATIONS, TARGETS, AttackConfig, LcdConfig
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.registry import PERTURBATIONS, TARGETS
 
 _OBJECTS = 2
 # Centralities of fewer nodes come from a dense solver, not from compiled code.
@@ -53,8 +54,9 @@ def load_everything(tell: Callable[[str], None] = lambda text: None) -> None:
         flip_logits(detector, graph, graph.edge[:2])
     for perturbation in PERTURBATIONS:
         tell(f'attack {perturbation}')
-        surrogate = 'none' if perturbation == 'recall' else 'svm_rbf'
-        load_for_attacker(AttackConfig(perturbation=perturbation, surrogate=surrogate))
+        load_for_attacker(AttackConfig(perturbation=perturbation))
+    tell('attack recall')
+    load_for_attacker(AttackConfig(search='recall'))
 
 
 def load_for_builder() -> None:

@@ -31,6 +31,7 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
+from adversarial_lcd_ros.registry import Table
 
 # The parameters of a node are the settings of its classes.
 NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
@@ -58,6 +59,8 @@ _HEADER = """\
 def limits(entry: Field[Any]) -> str:
     """Return the accepted values of a setting in a few words; '' if any will do."""
     low, high, choices = (entry.metadata[key] for key in ('low', 'high', 'choices'))
+    if isinstance(choices, Table):
+        return f'{"some" if entry.metadata["several"] else "one"} of {choices}'
     if choices:
         return f'one of {", ".join(choices)}'
     if low is None and high is None:

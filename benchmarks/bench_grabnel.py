@@ -132,12 +132,12 @@ def cost_and_gain(detector, graphs, attack):
 
 
 @pytest.mark.parametrize('features', SIZES)
-@pytest.mark.parametrize('perturbation', ['eigencentrality', 'recall'])
-def test_beside_grabnel(measured, tour_graphs, features, perturbation, grabnel_costs):
+@pytest.mark.parametrize('search', ['stepwise', 'recall'])
+def test_beside_grabnel(measured, tour_graphs, features, search, grabnel_costs):
     queries, count = SIZES[features]
     graphs = tour_graphs(features)
     detector = LoopClosureDetector(LcdConfig())
-    attacker = Attacker(AttackConfig(perturbation=perturbation, max_queries=queries))
+    attacker = Attacker(AttackConfig(search=search, max_queries=queries))
     for graph in graphs[:30]:
         detector.detect(graph)
         attacker.observe(graph)
@@ -150,7 +150,7 @@ def test_beside_grabnel(measured, tour_graphs, features, perturbation, grabnel_c
             detector, attacked, lambda graph, ask: by_grabnel(graph, ask, queries))
     rival_s, rival_gain, rival_changed = grabnel_costs[features]
     measured('grabnel',
-             f'n = {attacked[0].node_count}, {queries} queries, {perturbation}: loss gained '
+             f'n = {attacked[0].node_count}, {queries} queries, {search}: loss gained '
              f'{gain:.3f} beside {rival_gain:.3f}, decisions changed {changed} beside '
              f'{rival_changed} of {count}', ours_s,
              "GRABNEL's recipe, seconds a graph beside the queries", rival_s)

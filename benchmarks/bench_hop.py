@@ -23,7 +23,7 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
-from adversarial_lcd_ros.evaluation.replay.processes import environment
+from adversarial_lcd_ros.evaluation.replay.processes import node_environment
 from adversarial_lcd_ros.graph_sequences.bags import _graph_messages
 from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.endpoints import payload_qos
@@ -47,7 +47,7 @@ QUERY = {'mode': 'query', 'deadline_ms': DEADLINE_S * 1e3}
 def loopback(monkeypatch):
     """Put this process and those that it starts into one domain, on this machine only."""
     with own_domain() as domain:
-        for name, value in environment(domain).items():
+        for name, value in node_environment(domain).items():
             monkeypatch.setenv(name, value)
         monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
             (str(Path(__file__).parents[1]), str(Path(__file__).parent))))

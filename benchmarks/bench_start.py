@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
-from adversarial_lcd_ros.evaluation.replay.processes import environment
+from adversarial_lcd_ros.evaluation.replay.processes import node_environment
 from adversarial_lcd_ros.evaluation.replay.supervision import READY, NodeProcess, ended_together
 
 TOUR = Path(__file__).parents[1] / 'bags' / 'flat_tour'
@@ -25,7 +25,7 @@ def start_s(name, cache, folder):
     running = []
     with own_domain() as domain, ended_together(running):
         node = NodeProcess(name, ('--ros-args', *NODES[name]) if NODES[name] else (),
-                           {**environment(domain), 'NUMBA_CACHE_DIR': str(cache)},
+                           {**node_environment(domain), 'NUMBA_CACHE_DIR': str(cache)},
                            folder / f'{name}.log')
         running.append(node)
         deadline_s = time.monotonic() + TIMEOUT_S

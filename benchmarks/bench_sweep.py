@@ -15,7 +15,9 @@ from adversarial_lcd_ros.evaluation.workers import local_workers
 
 SIZES, RATIOS = (100, 300), (1e-4, 2e-4, 3e-4)
 FRAMES = 1
-SEARCHES = {'eigencentrality': 'svm_rbf', 'recall': 'none', 'optimum': 'none'}
+SEARCHES = {'eigencentrality': {'search': 'stepwise', 'perturbation': 'eigencentrality',
+                                'surrogate': 'svm_rbf'},
+            'recall': {'search': 'recall'}, 'optimum': {'search': 'optimum'}}
 JOBS = len(os.sched_getaffinity(0))
 
 
@@ -52,8 +54,8 @@ def test_recipe(measured, sweep, tmp_path):
              f'{len(rows)} cells, {JOBS} processes, a cell', together_s / len(rows),
              'one process', alone_s / len(rows))
     usual = {'target': 'wl', 'asked_target': 'wl', 'queries_per_edit': 40}
-    for search, surrogate in SEARCHES.items():
-        kind = {**usual, 'perturbation': search, 'surrogate': surrogate}
+    for search, settings in SEARCHES.items():
+        kind = {**usual, **settings}
         for ratio in RATIOS:
             measured('sweep', f'{search}, n = 305, r = {ratio:g}, a frame',
                      spent_s(rows, nodes=300, ratio=ratio, **kind), 'r = 3e-4',

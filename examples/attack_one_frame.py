@@ -2,7 +2,7 @@
 
 from adversarial_lcd_ros import AttackConfig, Attacker, LoopClosureDetector, open_graphs
 
-detector, attacker = LoopClosureDetector(), Attacker(AttackConfig(perturbation='recall'))
+detector, attacker = LoopClosureDetector(), Attacker(AttackConfig(search='recall'))
 for graph in open_graphs('bags/flat_tour@0:0.12').graphs:
     result = attacker.process(graph, lambda asked: detector.judge(asked).probability)
     before = detector.judge(graph)

@@ -15,7 +15,7 @@ from adversarial_lcd_ros import (
 tour = open_graphs('bags/flat_tour@0:0.5')
 stamps = [graph.stamp_ns for graph in tour.graphs]
 labels = label_frames(tour.trajectory, stamps, tour.image_size, LabelConfig())
-for attack in (None, AttackConfig(perturbation='recall')):
+for attack in (None, AttackConfig(search='recall')):
     decisions = run_offline(tour.graphs, LcdConfig(), attack)[0].decisions
     match = [stamps.index(decision.match_stamp_ns) if decision.is_loop else -1
              for decision in decisions]

@@ -27,7 +27,8 @@ CHOICES = {'attack': [*BOOLEANS], 'use_sim_time': [*BOOLEANS], 'lockstep': ['', 
 PARAMETERS = {
     'graph_builder': {'model': str},
     'lcd': {'target': str, 'threshold': float},
-    'attacker': {'mode': str, 'perturbation': str, 'surrogate': str, 'ratio': float},
+    'attacker': {'mode': str, 'search': str, 'perturbation': str, 'surrogate': str,
+                 'ratio': float},
     'bag_replay': {'bag': str, 'lockstep': BOOLEANS.__getitem__, 'rate': float, 'record': str},
 }
 ARGUMENTS = {

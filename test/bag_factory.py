@@ -13,6 +13,10 @@ WIDTH, HEIGHT = 64, 48
 START_NS, PERIOD_NS = 1_305_031_229_528_748_000, 33_333_333
 IMAGE, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 POSE = 'geometry_msgs/msg/PoseStamped'
+POSE_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
+ODOMETRY, PATH = 'nav_msgs/msg/Odometry', 'nav_msgs/msg/Path'
+TRANSFORM, TF = 'geometry_msgs/msg/TransformStamped', 'tf2_msgs/msg/TFMessage'
+CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
 TUM_TF = 'tf/msg/tfMessage'
 TUM_TOPIC = '/camera/rgb/image_color'
 TUM_CAMERA = '/openni_rgb_optical_frame'
@@ -102,6 +106,37 @@ class Messages:
             'geometry_msgs/msg/Pose',
             position=self.make('geometry_msgs/msg/Point', *position),
             orientation=self.make('geometry_msgs/msg/Quaternion', *quaternion)))
+
+    def pose_with_covariance(self, stamp_ns, position, quaternion=(0.0, 0.0, 0.0, 1.0),
+                             frame_id='world'):
+        plain = self.pose(stamp_ns, position, quaternion, frame_id)
+        return self.make(POSE_COVARIANCE, header=plain.header, pose=self._covariant(plain.pose))
+
+    def odometry(self, stamp_ns, position, quaternion=(0.0, 0.0, 0.0, 1.0), frame_id='odom',
+                 child='base_link'):
+        plain = self.pose(stamp_ns, position, quaternion, frame_id)
+        zero = self.make('geometry_msgs/msg/Vector3', 0.0, 0.0, 0.0)
+        return self.make(
+            ODOMETRY, header=plain.header, child_frame_id=child, pose=self._covariant(plain.pose),
+            twist=self.make('geometry_msgs/msg/TwistWithCovariance', twist=self.make(
+                'geometry_msgs/msg/Twist', linear=zero, angular=zero), covariance=np.zeros(36)))
+
+    def _covariant(self, pose):
+        return self.make('geometry_msgs/msg/PoseWithCovariance', pose=pose,
+                         covariance=np.zeros(36))
+
+    def path(self, poses, frame_id='world'):
+        return self.make(PATH, header=self.header(0, frame_id), poses=poses)
+
+    def tf(self, *links):
+        return self.make(TF, transforms=list(links))
+
+    def camera_info(self, stamp_ns, frame_id):
+        region = self.make('sensor_msgs/msg/RegionOfInterest', 0, 0, 0, 0, False)
+        return self.make(
+            CAMERA_INFO, header=self.header(stamp_ns, frame_id), height=HEIGHT, width=WIDTH,
+            distortion_model='plumb_bob', d=np.zeros(5), k=np.eye(3).ravel(), r=np.eye(3).ravel(),
+            p=np.zeros(12), binning_x=0, binning_y=0, roi=region)
 
     def link(self, stamp_ns, parent, child, position, quaternion=(0.0, 0.0, 0.0, 1.0)):
         return self.make(

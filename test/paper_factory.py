@@ -20,8 +20,13 @@ POWER = {('eigencentrality', 'svm_linear'): 0.02, ('eigencentrality', 'svm_poly'
 
 def make_row(sequence='synthetic_tour', target='wl', perturbation='eigencentrality',
              surrogate='svm_rbf', oracle='soft', mode='query', ratio=3e-4, seed=0, power=None,
-             frames=60, positives=None, asked_target=None, nodes=300, **settings):
+             frames=60, positives=None, asked_target=None, nodes=300, search='stepwise',
+             **settings):
     """Return a synthetic row; ``power`` is the chance that a right decision turns wrong."""
+    if perturbation in ('recall', 'optimum'):
+        search = perturbation
+    if search != 'stepwise':
+        perturbation, surrogate = search, 'none'
     tag = f'{sequence} {target} {perturbation} {surrogate} {mode} {ratio} {seed} {nodes}'
     rng = np.random.default_rng(zlib.crc32(tag.encode()))
     power = POWER[perturbation, surrogate] * ratio / 3e-4 if power is None else power
@@ -36,8 +41,10 @@ def make_row(sequence='synthetic_tour', target='wl', perturbation='eigencentrali
     edits = np.where(turned, np.minimum(queries // 40 + 1, budget), budget)
     change = effect(kind, before, after)
     return {
-        'sequence': sequence, 'target': target, 'perturbation': perturbation,
-        'surrogate': surrogate, 'oracle': oracle, 'mode': mode, 'ratio': ratio, 'edits': 'both',
+        'sequence': sequence, 'target': target, 'search': search,
+        'perturbation': perturbation if search == 'stepwise' else '',
+        'surrogate': surrogate if search == 'stepwise' else '',
+        'oracle': oracle, 'mode': mode, 'ratio': ratio, 'edits': 'both',
         'queries_per_edit': 40, 'nodes': nodes, 'threshold': 0.5, 'variant': '',
         'nodes_mean': nodes + 4.5,
         'edges_mean': 3.1 * nodes, 'seed': seed, 'frames': frames,

@@ -15,10 +15,9 @@ defaults: {nodes: 20, ratio: 0.02, queries_per_edit: 2}
 attacks:
   - perturbation: [random_flip, shortest_path]
     surrogate: none
-  - perturbation: recall
-    surrogate: none
+  - search: recall
     oracle: [soft, hard]
-  - perturbation: optimum
+  - search: optimum
 """
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros.lcd.targets import make_target, prepare
+from adversarial_lcd_ros.lcd.targets import make_target
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 # Object 0 has the features 2 to 6, object 1 has 7 to 9; 10 and 11 hang on nothing.
@@ -78,7 +78,7 @@ def test_a_prepared_target_scores_flips_as_from_scratch(graph, reference, seed):
     view, target = View(graph), make_target('anchored')
     nodes = Comparison(view, [View(reference), view])
     flipped = View(graph.flip(flips_of(graph, np.random.default_rng(seed), 4)), view)
-    assert prepare(target, view, nodes)(flipped).tolist() == target.compare(
+    assert target.prepare(view, nodes)(flipped).tolist() == target.compare(
         flipped, Comparison(flipped, nodes.references)).tolist()
 
 

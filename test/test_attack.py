@@ -20,6 +20,7 @@ from adversarial_lcd_ros.attack.oracle import (
 )
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS, Allowed, make_perturbation
 from adversarial_lcd_ros.attack.perturbations.eigencentrality import eigencentrality
+from adversarial_lcd_ros.attack.searches import SEARCHES
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.codec import LcdAnswer
@@ -189,11 +190,12 @@ def test_shortest_path_cuts_or_joins():
         (0, 1), (1, 2), (2, 3), (0, 2), (1, 3), (0, 3)}
 
 
-@pytest.mark.parametrize('surrogate', ['svm_rbf', 'none'])
-@pytest.mark.parametrize('perturbation', [*PERTURBATIONS, 'recall'])
-def test_an_attack_keeps_to_its_budgets(perturbation, surrogate):
-    config = AttackConfig(perturbation=perturbation, surrogate=surrogate, ratio=1e-3,
-                          queries_per_edit=12)
+@pytest.mark.parametrize('settings', [
+    *({'perturbation': name, 'surrogate': surrogate} for name in PERTURBATIONS
+      for surrogate in ('svm_rbf', 'none')),
+    *({'search': name} for name in SEARCHES if name != 'stepwise')], ids=str)
+def test_an_attack_keeps_to_its_budgets(settings):
+    config = AttackConfig(**settings, ratio=1e-3, queries_per_edit=12)
     detector = SecretDetector(GRAPH, start=50.0)
     before = GRAPH.edge.copy()
     result = Attacker(config).process(GRAPH, detector)
@@ -378,7 +380,7 @@ def later(graph, seconds):
 
 
 def test_recall_keeps_to_its_budgets_and_changes_nothing_else():
-    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker = Attacker(AttackConfig(search='recall', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
     for start in (50.0, -50.0):
         now = later(GRAPH, 20)
@@ -390,7 +392,7 @@ def test_recall_keeps_to_its_budgets_and_changes_nothing_else():
 
 
 def test_recall_deletes_edges_that_recur():
-    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker = Attacker(AttackConfig(search='recall', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
     now = later(GRAPH, 20)
     edges = {tuple(pair) for pair in now.edge.tolist()}
@@ -401,7 +403,7 @@ def test_recall_deletes_edges_that_recur():
 
 
 def test_recall_adds_edges_that_like_looking_features_had():
-    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker = Attacker(AttackConfig(search='recall', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
     gone = later(GRAPH.flip([(10, 11), (30, 31), (40, 41)]), 20)
     detector = SecretDetector(gone, start=-2.5, step=-1.0,
@@ -413,14 +415,14 @@ def test_recall_adds_edges_that_like_looking_features_had():
 
 
 def test_recall_knows_nothing_of_the_last_eight_seconds():
-    attacker = Attacker(AttackConfig(perturbation='recall', ratio=1e-3))
+    attacker = Attacker(AttackConfig(search='recall', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
     result = attacker.process(later(GRAPH, 7), SecretDetector(later(GRAPH, 7)))
     assert (result.status, result.reason) == ('failure', 'no graph left to recall')
 
 
 def test_recall_without_queries_adds_what_is_missing():
-    attacker = Attacker(AttackConfig(perturbation='recall', mode='surrogate', ratio=1e-3))
+    attacker = Attacker(AttackConfig(search='recall', mode='surrogate', ratio=1e-3))
     attacker.process(GRAPH, SecretDetector(GRAPH))
     missing = [[10, 11], [30, 31], [40, 41]]
     now = later(GRAPH.flip(missing), 20)

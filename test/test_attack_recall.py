@@ -19,7 +19,7 @@ RING = [(k, k + 1) for k in range(2, 59)]
 SPOKES = [(0, k) for k in range(10, 22)] + [(1, k) for k in range(30, 42)]
 LABELS = np.r_[5, 6, np.arange(58)].astype(np.uint32)
 GRAPH = make_graph(60, RING + SPOKES, objects=2, label=LABELS)
-SETTINGS = AttackConfig(perturbation='recall', ratio=1e-3)
+SETTINGS = AttackConfig(search='recall', ratio=1e-3)
 
 
 def later(graph, seconds):

@@ -13,7 +13,6 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import SURROGATES, Kernel, make_surrogate
 from adversarial_lcd_ros.codec import LcdAnswer
-from adversarial_lcd_ros.config import SURROGATES as CHOICES
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.decision import probability
@@ -25,6 +24,8 @@ from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
 
 GRAPH = make_graph(60, [*((k, (k + 1) % 60) for k in range(60)), *((0, k) for k in range(2, 30))])
 
+LEARNERS = [name for name in SURROGATES if name != 'none']
+
 
 def blobs(seed=0, rows=80, hard=False):
     """Return features of flips that gain and that do not; hard answers gain 2 or nothing."""
@@ -35,14 +36,13 @@ def blobs(seed=0, rows=80, hard=False):
 
 
 def test_every_choice_has_a_surrogate():
-    assert {*SURROGATES, 'none'} == set(CHOICES)
     assert make_surrogate('none') is None
     with pytest.raises(ConfigError, match='no surrogate'):
         make_surrogate('forest')
 
 
 @pytest.mark.parametrize('hard', [False, True])
-@pytest.mark.parametrize('name', list(SURROGATES))
+@pytest.mark.parametrize('name', LEARNERS)
 def test_a_surrogate_ranks_flips_that_gain_first(name, hard):
     features, gain = blobs(seed=1, hard=hard)
     surrogate, again = make_surrogate(name), make_surrogate(name)
@@ -55,7 +55,7 @@ def test_a_surrogate_ranks_flips_that_gain_first(name, hard):
     assert len(np.unique(score)) == len(score)
 
 
-@pytest.mark.parametrize('name', list(SURROGATES))
+@pytest.mark.parametrize('name', LEARNERS)
 def test_a_surrogate_declines_data_that_do_not_suffice(name):
     features, gain = blobs()
     assert not make_surrogate(name).fit(features[:9], gain[:9])
@@ -109,7 +109,7 @@ class Judge:
 
 
 @pytest.mark.parametrize('soft', [True, False])
-@pytest.mark.parametrize('name', [*SURROGATES, 'none'])
+@pytest.mark.parametrize('name', list(SURROGATES))
 def test_each_surrogate_attacks_softly_and_hardly_within_its_budgets(name, soft):
     config = AttackConfig(perturbation='random_flip', surrogate=name, ratio=1e-3,
                           queries_per_edit=25, edits='delete')

@@ -1,5 +1,6 @@
 """Compiled code: kept where it can be, and all of it there before the first real graph."""
 
+from dataclasses import replace
 import logging
 from pathlib import Path
 import sys
@@ -12,15 +13,10 @@ from adversarial_lcd_ros import paths, preloading
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.codec import decode_graph, encode_graph
 from adversarial_lcd_ros.compiled import caching
-from adversarial_lcd_ros.config import (
-    PERTURBATIONS,
-    TARGETS,
-    AttackConfig,
-    BuilderConfig,
-    LcdConfig,
-)
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.registry import PERTURBATIONS, TARGETS
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
@@ -127,10 +123,10 @@ def run_targets(graphs):
 
 
 def run_attacks(graphs):
-    for perturbation in PERTURBATIONS:
-        surrogate = 'none' if perturbation == 'recall' else 'svm_rbf'
-        run_offline(graphs[:3], LcdConfig(min_gap_s=1.0), AttackConfig(
-            perturbation=perturbation, surrogate=surrogate, max_queries=6, queries_per_edit=1))
+    for attack in (AttackConfig(search='recall'),
+                   *(AttackConfig(perturbation=name) for name in PERTURBATIONS)):
+        run_offline(graphs[:3], LcdConfig(min_gap_s=1.0),
+                    replace(attack, max_queries=6, queries_per_edit=1))
 
 
 @pytest.mark.parametrize('run', [run_targets, run_attacks])

@@ -19,11 +19,11 @@ from adversarial_lcd_ros.evaluation.frames.rows import make_row
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 from adversarial_lcd_ros.evaluation.store import CELLS, open_store, read_cells
 
-CELL = Cell('eigencentrality', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
+CELL = Cell('stepwise', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 
 
 @pytest.mark.parametrize('changed', [
-    {'perturbation': 'optimum'}, {'attack': AttackConfig(ratio=1e-4)},
+    {'search': 'optimum'}, {'attack': AttackConfig(ratio=1e-4)},
     {'attack': AttackConfig(gamma='scale')}, {'target': 'edges'}, {'asked_target': 'edges'},
     {'oracle': 'hard'}, {'nodes': 100}, {'frames': 5}, {'threshold': 0.9}])
 def test_a_key_depends_on_every_setting(changed):

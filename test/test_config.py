@@ -9,12 +9,8 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
-from adversarial_lcd_ros import config as settings_of
-from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS
-from adversarial_lcd_ros.attack.surrogates import SURROGATES
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.settings import (
     NODE_CONFIGS,
     SECTIONS,
@@ -188,9 +184,3 @@ def test_nodes_take_params_yaml_in_any_namespace(namespace):
     defaults = {entry.name: entry.default for config in NODE_CONFIGS['attacker']
                 for entry in fields(config)}
     assert {name: found.get(name) for name in defaults} == defaults
-
-
-def test_choices_are_the_tables():
-    assert set(settings_of.TARGETS) == set(TARGETS)
-    assert set(settings_of.SURROGATES) == {*SURROGATES, 'none'}
-    assert set(settings_of.PERTURBATIONS) == {*PERTURBATIONS, 'recall'}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer, flip_logits
@@ -17,19 +18,31 @@ from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
 from adversarial_lcd_ros.paths import model_path
 
+# Everything that a detector may have between a graph and its answer.
+SETTINGS = {
+    'plain': {}, 'geometric check': {'geometric_check': True, 'geometric_inliers': 15},
+    **{name: {'defences': f'own_defences:{name}'} for name in (
+        'DropsLongEdges', 'DropsAllAtThree', 'IgnoresEdges', 'CountsLikeLengths', 'RefusesEven')},
+    'several': {'defences': 'own_defences:CountsLikeLengths, own_defences:DropsLongEdges',
+                'geometric_check': True, 'geometric_inliers': 15}}
 
-@pytest.fixture(params=list(TARGETS))
+
+@pytest.fixture(params=[*((target, 'plain') for target in TARGETS),
+                        *((target, name) for target in ('wl', 'edges', 'anchored', 'vbow')
+                          for name in SETTINGS if name != 'plain')], ids=', '.join)
 def make_detector(request, tmp_path):
     """Return a function that makes a detector with given keyframes, one a second."""
-    channels = TARGETS[request.param].channels
+    target, name = request.param
+    channels = TARGETS[target].channels
     path = tmp_path / 'model.json'
-    Decision(request.param, channels, (7.0, 9.0, 5.0)[:len(channels)], -8.0).save(path)
-    if request.param == 'gnn':
+    # The bias is such that decisions fall on either side.
+    Decision(target, channels, (7.0, 9.0, 5.0)[:len(channels)], -8.0).save(path)
+    if target == 'gnn':
         shutil.copy(model_path(NETWORK), path.with_suffix('.onnx'))
 
     def make(keyframes):
-        detector = LoopClosureDetector(
-            LcdConfig(target=request.param, model=str(path), min_gap_s=1.0))
+        detector = LoopClosureDetector(LcdConfig(
+            target=target, model=str(path), min_gap_s=1.0, threshold=0.3, **SETTINGS[name]))
         for second, keyframe in enumerate(keyframes):
             detector.detect(replace(keyframe, stamp_ns=second * 10**9))
         return detector
@@ -37,7 +50,14 @@ def make_detector(request, tmp_path):
 
 
 def by_judging(detector, graph, pairs):
-    return [detector.log_odds(graph.flip(pair)).max() for pair in pairs]
+    # A detector without what flips leave alone: nothing kept can be wrong.
+    logits = []
+    for pair in pairs:
+        detector._latest = None
+        decision = detector.judge(graph.flip(pair))
+        logits.append(max(np.log(decision.probability) - np.log1p(-decision.probability), -700)
+                      if decision.probability else -700)
+    return logits
 
 
 # The first call compiles.
@@ -93,3 +113,38 @@ def test_step_after_step_the_scores_are_those_of_a_fresh_scorer(make_detector):
 
 def test_without_a_candidate_no_flip_makes_a_loop(make_detector):
     assert (flip_logits(make_detector([]), make_graph()) == -np.inf).all()
+
+
+@pytest.fixture
+def tour(tmp_path):
+    """Return a detector of edges with some settings and two keyframes, and a graph to judge."""
+    path = tmp_path / 'model.json'
+    Decision('edges', ('edges',), (10.0,), -4.0).save(path)
+    rng = np.random.default_rng(0)
+    edges = [(k % 3, k) for k in range(5, 20)] + [(k, k + 1) for k in range(3, 19)]
+    graph = replace(make_graph(20, edges, objects=3), stamp_ns=10**12)
+    graph = replace(graph, edge_length=np.linspace(0.1, 0.6, graph.edge_count, dtype=np.float32))
+
+    def make(**settings):
+        detector = LoopClosureDetector(LcdConfig(target='edges', model=str(path), min_gap_s=1.0,
+                                                 **settings))
+        for second, flip in enumerate([(3, 5), (5, 7)]):
+            # Elsewhere in the image, by no motion of the camera.
+            position = rng.uniform(0, 480, graph.position.shape).astype(np.float32)
+            detector.remember(replace(graph.flip([flip]), stamp_ns=second * 10**9,
+                                      position=position))
+        return detector
+    return make, graph
+
+
+@pytest.mark.parametrize('name', [name for name in SETTINGS if name != 'plain'])
+def test_every_setting_makes_a_difference(tour, name):
+    make, graph = tour
+    undefended = flip_logits(make(), graph)
+    assert not np.allclose(flip_logits(make(**SETTINGS[name]), graph), undefended)
+
+
+def test_a_defence_that_moves_nodes_is_refused(tour):
+    make, graph = tour
+    with pytest.raises(ConfigError, match='moves_nodes returned a graph with other nodes'):
+        make(defences='own_defences:MovesNodes').judge(graph)

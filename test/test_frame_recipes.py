@@ -16,20 +16,20 @@ def written(tmp_path, text):
 def test_the_paper_recipe_holds_what_the_paper_has_and_leaves_open():
     cells = load_cells('paper', {})
     surrogates = {cell.attack.surrogate for cell in cells
-                  if cell.perturbation == 'eigencentrality' and cell.attack.ratio == 3e-4}
+                  if cell.method == 'eigencentrality' and cell.attack.ratio == 3e-4}
     assert surrogates == {'svm_rbf', 'svm_linear', 'svm_poly', 'naive_bayes'}
     for perturbation in ('eigencentrality', 'random_walk', 'shortest_path', 'random_flip',
                          'recall', 'optimum'):
-        assert {cell.attack.ratio for cell in cells if cell.perturbation == perturbation} == {
+        assert {cell.attack.ratio for cell in cells if cell.method == perturbation} == {
             1e-4, 2e-4, 3e-4}
-    moved = {(cell.perturbation, cell.asked_target, cell.target) for cell in cells
+    moved = {(cell.method, cell.asked_target, cell.target) for cell in cells
              if cell.asked_target != cell.target}
     assert moved == {(perturbation, *pair) for perturbation in ('eigencentrality', 'recall')
                      for pair in (('wl', 'anchored'), ('anchored', 'wl'))}
     assert {cell.oracle for cell in cells if cell.target == 'anchored'} == {'soft', 'hard'}
     assert {cell.nodes for cell in cells} == {100, 300, 1000}
     assert {cell.attack.queries_per_edit for cell in cells} == {10, 40}
-    assert {cell.perturbation for cell in cells if cell.attack.mode == 'surrogate'} == {
+    assert {cell.method for cell in cells if cell.attack.mode == 'surrogate'} == {
         'eigencentrality', 'recall'}
 
 
@@ -43,9 +43,9 @@ attacks:
   - ratio: [1e-4, 0.0002]
     target: [wl, edges]
   - {frames: 2}
-  - {perturbation: optimum, queries_per_edit: [10, 40], oracle: [soft, hard]}
+  - {search: optimum, queries_per_edit: [10, 40], oracle: [soft, hard]}
 """), {})
-    assert [(cell.perturbation, cell.attack.ratio, cell.target) for cell in cells] == [
+    assert [(cell.method, cell.attack.ratio, cell.target) for cell in cells] == [
         ('eigencentrality', 1e-4, 'wl'), ('eigencentrality', 1e-4, 'edges'),
         ('eigencentrality', 2e-4, 'wl'), ('eigencentrality', 2e-4, 'edges'),
         ('optimum', 1e-4, 'wl')]
@@ -74,6 +74,9 @@ def test_of_attacks_made_equal_by_the_command_line_the_first_counts():
     ('protocol: frames\nattacks: [{ratio: []}]', 'empty list'),
     ('protocol: frames\nattacks: [{ratio: much}]', r'mine\.yaml.*ratio'),
     ('protocol: frames\nattacks: [{perturbation: best}]', r'mine\.yaml.*perturbation'),
+    ('protocol: frames\nattacks: [{perturbation: recall}]', 'write "search: recall" instead'),
+    ('protocol: frames\nattacks: [{perturbation: [optimum]}]', 'write "search: optimum" instead'),
+    ('attacks: [{name: a, search: optimum}]', 'protocol "live"'),
     ('protocol: frames\nattacks: [{oracle: loud}]', r'mine\.yaml.*oracle'),
     ('protocol: frames\nattacks: [{frames: 2}, {frames: 3}]', 'there twice'),
     ('protocol: frames\nseeds: 0\nattacks: [{}]', 'seeds'),

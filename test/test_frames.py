@@ -24,9 +24,9 @@ from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 
 RING = [(k, k + 1) for k in range(2, 29)] + [(k % 2, k) for k in range(4, 30)]
 ATTACK = AttackConfig(surrogate='none', ratio=0.01, queries_per_edit=3)
-CELLS = [Cell('random_flip', replace(ATTACK, perturbation='random_flip'), 'wl', 'wl', 'soft', 30,
+CELLS = [Cell('stepwise', replace(ATTACK, perturbation='random_flip'), 'wl', 'wl', 'soft', 30,
               2, 1),
-         Cell('recall', replace(ATTACK, perturbation='recall'), 'wl', 'wl', 'hard', 30, 2, 1),
+         Cell('recall', replace(ATTACK, search='recall'), 'wl', 'wl', 'hard', 30, 2, 1),
          Cell('optimum', ATTACK, 'wl', 'wl', 'soft', 30, 2, 1)]
 
 
@@ -118,7 +118,7 @@ def test_the_threshold_is_the_cells(lcd):
 def test_transfer_asks_one_target_and_is_judged_by_another():
     lcd = LcdConfig(min_gap_s=2.0, map_window=0)
     graphs = stream(changed=60)
-    cell = Cell('random_flip', CELLS[0].attack, 'descriptors', 'wl', 'soft', 30, 2, 1)
+    cell = Cell('stepwise', CELLS[0].attack, 'descriptors', 'wl', 'soft', 30, 2, 1)
     results, = attack_frames(graphs, SAMPLE, [cell], lcd, seed=0)
     judging, asked = (LoopClosureDetector(replace(lcd, target=name))
                       for name in ('descriptors', 'wl'))

@@ -17,7 +17,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database, bow_score
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.lcd.targets import TARGETS, make_target, prepare
+from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
@@ -214,7 +214,7 @@ def test_what_was_judged_before_changes_no_bit_of_a_probability(model, target):
 def test_a_flip_at_an_object_changes_the_score_of_objects():
     view = View(GRAPH)
     nodes = Comparison(view, [View(GRAPH), View(make_graph(40, seed=3))])
-    scores = prepare(make_target('wl'), view, nodes)
+    scores = make_target('wl').prepare(view, nodes)
     flipped = View(GRAPH.flip([(0, 12), (0, 5), (2, 3)]), view)
     assert (scores(flipped) != scores(view)).any(axis=0).tolist() == [True, True, True]
     assert scores(flipped).tolist() == make_target('wl').compare(flipped, nodes).tolist()
@@ -320,7 +320,7 @@ def test_the_network_sees_edges_and_a_damaged_one_is_refused(tmp_path):
         make_target('gnn', tmp_path / 'missing.onnx')
 
 
-@pytest.mark.parametrize('target', TARGETS)
+@pytest.mark.parametrize('target', list(TARGETS))
 def test_what_ships_belongs_to_its_target(target):
     detector = LoopClosureDetector(LcdConfig(target=target, min_gap_s=1.0))
     detector.detect(at(0))

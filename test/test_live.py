@@ -41,7 +41,7 @@ def tour():
 
 def test_wire_and_offline_agree_decision_by_decision(tour, tmp_path, monkeypatch):
     attacks = {
-        'recall': AttackConfig(perturbation='recall', surrogate='none', max_queries=8),
+        'recall': AttackConfig(search='recall', max_queries=8),
         'paper': AttackConfig(queries_per_edit=1, max_queries=6)}
     runs = {}
     replay = live.Replays.run
@@ -107,14 +107,14 @@ def test_an_attacker_over_budget_fails_the_run():
 
 def test_the_recipe_that_ships_and_what_overrides_it():
     attacks = load_recipe('quick', {'ratio': 1e-4})
-    assert {attack.perturbation for attack in attacks.values()} >= {'recall', 'eigencentrality'}
+    assert {attack.search for attack in attacks.values()} == {'recall', 'stepwise'}
     assert {attack.ratio for attack in attacks.values()} == {1e-4}
 
 
 @pytest.mark.parametrize(('text', 'said'), [
     ('attacks: []', 'expected a list'),
     ('nothing: 1', 'expected a list'),
-    ('attacks: [{perturbation: recall}]', 'no attack with a name'),
+    ('attacks: [{search: recall}]', 'no attack with a name'),
     ('attacks: [{name: a, epsilon: 1}]', 'unknown setting epsilon'),
     ('attacks: [{name: a}, {name: a}]', 'taken'),
     ('{', 'cannot be read'),

@@ -151,7 +151,7 @@ def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
         '| before', '| recall, query-guided', '| eigencentrality + SVM-RBF, query-guided',
         '| optimum (yardstick)']
     recall = next(cell for cell in cells if cell['sequence'] == SEQUENCES[0]
-                  and (cell['target'], cell['perturbation']) == ('wl', 'recall'))
+                  and (cell['target'], cell['method']) == ('wl', 'recall'))
     fields = lines[3].split(' | ')
     assert fields[1] == '200'
     assert fields[5].startswith(f'{recall["decline_pp"]:.1f} (')
@@ -185,9 +185,9 @@ def test_another_threshold_is_another_setting():
     cells = summarise_cells(rows)
     assert len(cells) == len(rows)
     optimum = {(cell['sequence'], cell['threshold']): cell['decline_pp'] for cell in cells
-               if cell['perturbation'] == 'optimum'}
+               if cell['method'] == 'optimum'}
     for cell in cells:
-        if cell['perturbation'] == 'recall':
+        if cell['method'] == 'recall':
             assert cell['share_of_optimum'] == pytest.approx(
                 cell['decline_pp'] / optimum[cell['sequence'], cell['threshold']])
     assert '| recall, query-guided, threshold 0.9 |' in markdown_tables(
@@ -236,8 +236,8 @@ def test_tables_compare_one_thing_at_a_time():
     assert [table.setting['target'] for table in found].count('anchored') == 1
     assert 'optimum (yardstick)' not in {
         method.name for method in found[0].ranking.methods}
-    assert found[0].lines[0].strongest['perturbation'] == 'recall'
-    assert {entry['surrogate'] for entry in found[0].lines[0].entries} == {'svm_rbf', 'none'}
+    assert found[0].lines[0].strongest['method'] == 'recall'
+    assert {entry['surrogate'] for entry in found[0].lines[0].entries} == {'svm_rbf', 'none', ''}
 
 
 def test_sequences_without_a_column_are_left_out_and_told():
@@ -274,7 +274,7 @@ def test_warnings():
 
 
 def test_query_curves_end_at_the_share_turned():
-    rows = [make_row(sequence, perturbation='recall', surrogate='none', seed=seed, frames=200)
+    rows = [make_row(sequence, search='recall', seed=seed, frames=200)
             for sequence in SEQUENCES[:2] for seed in (0, 1)]
     setting = {name: rows[0][name] for name in tables.SETTING}
     curve, = curves.query_curves(rows, setting, 3e-4)
@@ -289,7 +289,7 @@ def test_query_curves_end_at_the_share_turned():
 
 
 def test_map_of_targets_holds_transfer():
-    rows = [make_row(target=target, perturbation='recall', surrogate='none', power=power,
+    rows = [make_row(target=target, search='recall', power=power,
                      asked_target=asked, frames=100)
             for target, asked, power in (('wl', 'wl', 0.4), ('anchored', 'anchored', 0.6),
                                          ('anchored', 'wl', 0.2))]

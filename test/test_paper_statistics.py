@@ -26,9 +26,9 @@ def test_repeats_are_averaged_within_a_sequence():
     cells = summarise_cells(ROWS)
     assert len(cells) == 4
     assert set(cells[0]) >= AGREED
-    cell = next(cell for cell in cells if cell['perturbation'] == 'recall')
+    cell = next(cell for cell in cells if cell['method'] == 'recall')
     rows = [row for row in ROWS
-            if (row['sequence'], row['perturbation']) == (cell['sequence'], 'recall')]
+            if (row['sequence'], row['search']) == (cell['sequence'], 'recall')]
     declines = [row['decline_pp'] for row in rows]
     assert cell['seeds'] == 3
     assert cell['decline_pp'] == pytest.approx(np.mean(declines))
@@ -42,7 +42,7 @@ def test_repeats_are_averaged_within_a_sequence():
 
 def test_repeats_are_no_further_evidence():
     """Ten equal repeats have the interval of one."""
-    one = make_row(perturbation='recall', surrogate='none')
+    one = make_row(search='recall')
     ten = [{**one, 'seed': seed} for seed in range(10)]
     assert summarise_cells(ten)[0]['ci95'] == summarise_cells([one])[0]['ci95']
 
@@ -81,14 +81,14 @@ def test_interval_of_one_seed_is_that_of_the_evaluation():
 
 
 def test_share_of_the_optimum():
-    rows = [make_row(perturbation='recall', surrogate='none', power=0.2, frames=400),
+    rows = [make_row(search='recall', power=0.2, frames=400),
             make_row(perturbation='optimum', surrogate='none', power=0.5, frames=400),
             make_row(perturbation='optimum', surrogate='none', power=0.1, ratio=2e-4),
-            make_row(target='edges', perturbation='recall', surrogate='none'),
-            make_row(target='vbow', perturbation='recall', surrogate='none'),
+            make_row(target='edges', search='recall'),
+            make_row(target='vbow', search='recall'),
             make_row(target='vbow', perturbation='optimum', surrogate='none', power=0.0)]
     cells = summarise_cells(rows)
-    share = {(cell['target'], cell['perturbation'], cell['ratio']): cell['share_of_optimum']
+    share = {(cell['target'], cell['method'], cell['ratio']): cell['share_of_optimum']
              for cell in cells}
     assert share['wl', 'recall', 3e-4] == pytest.approx(rows[0]['decline_pp']
                                                         / rows[1]['decline_pp'])
@@ -134,7 +134,7 @@ def test_ranks_need_complete_rows():
     rows = [make_row(sequence, perturbation=perturbation) for sequence in SEQUENCES
             for perturbation in ('eigencentrality', 'random_walk')][:-1]
     cells = summarise_cells(rows)
-    names = {tuple(cell[factor] for factor in ATTACK): cell['perturbation'] for cell in cells}
+    names = {tuple(cell[factor] for factor in ATTACK): cell['method'] for cell in cells}
     table = declines_by_sequence(cells, names)
     assert set(table) == {'eigencentrality', 'random_walk'}
     assert all(list(row) == sorted(SEQUENCES[:3]) for row in table.values())

@@ -24,7 +24,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
-from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
 
 COUNT = 60
 ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',
@@ -287,3 +287,87 @@ def test_environment_names_what_figures_depend_on():
     assert found['python']
     assert found['versions']['numpy']
     assert found['versions']['opencv']
+
+
+# without ground truth ------------------------------------------------------------------------
+
+@pytest.fixture(scope='module')
+def bare_records():
+    labels = unlabelled(np.arange(COUNT) * 10**9)
+    return make_records(labels, decide(range(30, 60)), make_runs())
+
+
+@pytest.fixture
+def bare(bare_records):
+    return summarise('walks', bare_records, ATTACKS,
+                     GraphStatistics.of([300] * COUNT, [900] * COUNT), seed=1)
+
+
+def test_without_ground_truth_changes_are_counted_and_nothing_else(bare, bare_records):
+    assert not bare['labelled']
+    for figures in (bare, bare['clean'], *bare['attacks']):
+        unknown = {'positives', 'tp', 'fp', 'recall', 'balanced_accuracy', 'suppressed',
+                   'decline_pp', 'wrong_closures_unscored'} & set(figures)
+        assert all(figures[name] is None for name in unknown)
+    eigen, walk = bare['attacks']
+    # Silenced: 30 to 34. Raised: 20. With another match: 40.
+    assert bare['clean']['loops_declared'] == 30
+    counted = [eigen[name] for name in ('silenced', 'raised', 'redirected', 'changed')]
+    assert counted == [5, 1, 1, 7]
+    assert eigen['success_rate'] == 7 / 54
+    assert eigen['agreement'] == 53 / 60
+    assert (walk['changed'], walk['agreement'], walk['success_rate']) == (0, 1.0, 0.0)
+    effects = [record.effect for record in runs_of(bare_records)['eigen']]
+    assert [effects[k] for k in (20, 30, 40, 50)] == ['raised', 'silenced', 'redirected', '']
+    assert json.loads(json.dumps(bare, allow_nan=False)) == bare
+
+
+def test_with_ground_truth_changes_are_counted_as_well(summary):
+    assert summary['labelled']
+    assert summary['attacks'][0]['changed'] == 7
+    assert summary['clean']['loops_declared'] == 30
+
+
+def test_the_headline_without_ground_truth_claims_no_accuracy(bare):
+    text = wording.headline(bare)
+    assert '30 loops in 60 frames' in text
+    assert 'changed 7 decisions' in text
+    assert 'Without ground truth nobody can say' in text
+    assert 'accuracy' not in text
+    assert 'nobody can say' in wording.headline({**bare, 'attacks': []})
+
+
+def test_no_attack_that_could_be_made_is_no_rate(bare_records):
+    reports = [report_of(index, status='skipped', edit_budget=0, edits=0, queries=0)
+               for index in range(COUNT)]
+    records = make_records(unlabelled(np.arange(COUNT) * 10**9), decide(range(30, 60)),
+                           {'eigen': AttackRun(decide(range(30, 60)), reports)})
+    found = summarise('walks', records, {'eigen': AttackConfig()},
+                      GraphStatistics.of([0] * COUNT, [0] * COUNT), seed=1)
+    assert found['attacks'][0]['success_rate'] is None
+    assert wording.headline(found).startswith('All 60 graphs of walks are empty')
+
+
+def test_the_report_without_ground_truth_says_what_is_missing(bare, bare_records, tmp_path):
+    folder = results.ResultsFolder.create(tmp_path, datetime(2026, 1, 1, tzinfo=timezone.utc))
+    folder.write_setup([LcdConfig()], ['adversarial-lcd', 'evaluate'], 42)
+    folder.write_json('summary.json', as_document(bare))
+    write_records(folder.path / 'per_query.csv', bare_records)
+    page = report.write_report(folder.path, bare, bare_records, []).read_text()
+    for said in ('What each attack changed', 'No accuracy, precision, recall or curve',
+                 'No frame has ground truth', '7 of 60', 'silenced'):
+        assert said in page
+    for unsaid in ('None', 'a new place', 'Decline', 'block bootstrap'):
+        assert unsaid not in page
+    assert report.report_folder(folder.path).read_text() == page
+    console = Console(file=io.StringIO(), width=150)
+    console.print(tables.decline_table(bare), tables.figure_table(bare))
+    assert 'success rate' in console.file.getvalue()
+
+
+def test_pictures_without_ground_truth_show_what_changed(bare_records):
+    runs = runs_of(bare_records)
+    chosen = choose_records(runs['eigen'], 3)
+    assert [record.effect for record in chosen] == ['raised', 'silenced', 'redirected']
+    assert 'another frame' in describe(chosen[2], runs['clean'][40])[1]
+    assert describe(runs['eigen'][50], runs['clean'][50])[0] == 'Frame 50: unchanged'

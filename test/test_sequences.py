@@ -79,8 +79,8 @@ def test_image_folder_with_a_pose_per_image(tmp_path):
     truth.write_text('\n'.join(make.pose_line(stamp) for stamp in make.stamps(3)))
     folder = images(tmp_path / 'walk')
     assert open_sequence(folder, ground_truth=truth).stamps_ns.tolist() == make.stamps(3)
-    at_rate = open_sequence(folder, ground_truth=truth, rate_hz=20.0)
-    assert at_rate.stamps_ns.tolist() == [make.START_NS + k * 50_000_000 for k in range(3)]
+    with pytest.raises(SequenceError, match=r'per image, over 0\.06\d* s.*leave the rate'):
+        open_sequence(folder, ground_truth=truth, rate_hz=1.0)
     truth.write_text(make.pose_line(0))
     with pytest.raises(SequenceError, match=r'3 images.*1 poses'):
         open_sequence(folder, ground_truth=truth)

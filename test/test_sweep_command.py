@@ -58,14 +58,15 @@ def test_it_announces_runs_reports_and_goes_on(tmp_path, command, capsys):
 
 
 def test_settings_of_the_command_line_win(tmp_path, command):
-    assert command('--perturbation', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
+    assert command('--search', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
     entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
-    assert (entry['perturbation'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
+    assert (entry['search'], entry['nodes'], entry['nodes_mean']) == ('optimum', 12, 12)
+    assert (entry['perturbation'], entry['surrogate']) == ('', '')
 
 
 def test_cells_of_other_settings_are_kept_and_not_reported(tmp_path, command, capsys):
     for candidates in ('5', '4'):
-        assert command('--perturbation', 'optimum', '--seeds', '1', '--lcd-candidates',
+        assert command('--search', 'optimum', '--seeds', '1', '--lcd-candidates',
                        candidates) == 0
     assert 'models or code: 1;' in capsys.readouterr().err
     assert len((tmp_path / 'out' / 'cells.jsonl').read_text().splitlines()) == 2
@@ -114,3 +115,22 @@ def test_a_sequence_without_ground_truth_is_refused(tmp_path, command, capsys):
 def test_a_recipe_that_replays_has_no_such_options(capsys, arguments, said):
     assert main(['evaluate', *arguments]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_json_is_all_that_goes_to_standard_output(tmp_path, command, capsys):
+    assert command('--perturbation', 'random_flip', '--seeds', '1', '--json') == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == {'folder': str(tmp_path / 'out'),
+                     **json.loads((tmp_path / 'out' / 'summary.json').read_text())}
+    assert found['kind'] == 'frames'
+
+
+def test_the_report_of_the_folder_is_made_anew_from_its_cells(tmp_path, command, capsys):
+    assert command('--seeds', '1') == 0
+    report = tmp_path / 'out' / 'report.html'
+    before = report.read_bytes()
+    report.unlink()
+    assert main(['report', str(tmp_path / 'out')]) == 0
+    assert report.read_bytes() == before
+    assert main(['inspect', str(tmp_path / 'out')]) == 0
+    assert 'Decline in balanced accuracy on walk' in capsys.readouterr().out

@@ -13,7 +13,7 @@ from adversarial_lcd_ros.evaluation.store import open_store
 from adversarial_lcd_ros.evaluation.streams import open_streams
 
 ATTACK = AttackConfig(perturbation='random_flip', surrogate='none', ratio=0.5, queries_per_edit=1)
-CELLS = [Cell('random_flip', ATTACK, 'wl', 'wl', 'soft', NODES, 3, 2),
+CELLS = [Cell('stepwise', ATTACK, 'wl', 'wl', 'soft', NODES, 3, 2),
          Cell('optimum', ATTACK, 'wl', 'wl', 'soft', NODES, 3, 2)]
 
 

@@ -76,9 +76,17 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     assert command('--targets', 'edges', '--lcd-geometric-check',
                    '--lcd-geometric-inliers', '21') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
-    assert [row['geometric_check'] for row in rows] == [False, True]
-    assert rows[1]['recall'] == 0
+    assert [row['geometric_check'] for row in rows] == [True, True]
+    assert [row['recall'] for row in rows] == [0, 0]
     assert '| walk, geometric check |' in capsys.readouterr().out
+
+
+def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
+    assert command('--targets', 'edges', '--lcd-defences', 'own_defences:IgnoresEdges') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
+    assert [row['defences'] for row in rows] == ['own_defences:IgnoresEdges'] * 2
+    assert [row['recall'] for row in rows] == [0, 0]
+    assert '| walk, own_defences:IgnoresEdges |' in capsys.readouterr().out
 
 
 def test_live_and_pairs_see_the_threshold(tmp_path, command):
@@ -143,3 +151,20 @@ def test_a_map_may_be_trained_on_where_the_queries_are_not():
     line = target_tables([row]).splitlines()[2]
     assert line.startswith(f'| {source}, scored from 0.5 to 1 (references seen in training) |')
     assert '| 0 (0 loops) | - | - | - | - | - |' in line
+
+
+def test_json_is_all_that_goes_to_standard_output(tmp_path, command, capsys):
+    assert command('--targets', 'vbow', '--json') == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == {'folder': str(tmp_path / 'out'),
+                     **json.loads((tmp_path / 'out' / 'summary.json').read_text())}
+    assert [row['target'] for row in found['rows']] == ['vbow', 'vbow']
+    assert main(['report', str(tmp_path / 'out')]) == 0
+
+
+def test_a_training_without_the_target_is_told_by_what_it_has(tmp_path, command, capsys):
+    (tmp_path / 'models').mkdir()
+    (tmp_path / 'models' / 'target_edges.json').write_text('{}')
+    assert command('--targets', 'wl', '--lcd-model', str(tmp_path / 'models')) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert 'no decision for the target wl; those trained there: edges' in said

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
-from pathlib import Path
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.oracle import Ask, Oracle, OracleSilentError, edit_budget
-from adversarial_lcd_ros.attack.search import Hunt, Search
-from adversarial_lcd_ros.attack.searches.recall import Recall
-from adversarial_lcd_ros.attack.searches.stepwise import Stepwise
-from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
+from adversarial_lcd_ros.attack.search import Hunt
+from adversarial_lcd_ros.attack.searches import make_search
 from adversarial_lcd_ros.codec import AttackReport
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.errors import BudgetError, ConfigError
+from adversarial_lcd_ros.errors import BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
 
 
 @dataclass(frozen=True)
@@ -78,17 +74,7 @@ class Attacker:
 
     def __init__(self, config: AttackConfig | None = None) -> None:
         self.config = config or AttackConfig()
-        self._search: Search
-        if self.config.perturbation == 'recall':
-            self._search = Recall(self.config)
-        elif self.config.mode == 'surrogate' and self.config.surrogate == 'none':
-            raise ConfigError('mode "surrogate" needs a surrogate: found surrogate "none"')
-        else:
-            self._search = Stepwise(self.config, self._data)
-
-    def _data(self) -> SurrogateData:
-        chosen = self.config.surrogate_data
-        return SurrogateData.load(Path(chosen) if chosen else model_path(SURROGATE_DATA))
+        self._search = make_search(self.config)
 
     def process(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
         """

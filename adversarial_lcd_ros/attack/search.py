@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from adversarial_lcd_ros.attack.oracle import Oracle, answer_logit
+from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.shown import Shown
+
+COMMON_SETTINGS = ('mode', 'search', 'ratio', 'queries_per_edit', 'max_queries', 'deadline_ms',
+                   'edits', 'seed')
 
 
 @dataclass
@@ -74,18 +80,35 @@ class Hunt:
         self.best, self.loss, self.succeeded = graph, loss, succeeded
 
 
-class Search(Protocol):
-    """A way to look for flips."""
+class Search(Shown, ABC):
+    """
+    A way to look for flips; one of your own is a subclass that is made from an AttackConfig.
 
+    Attributes
+    ----------
+    own_settings : tuple of str
+        Settings of AttackConfig that count for this search, beside those of every attack
+        (``COMMON_SETTINGS``). Reports name no others.
+    query_share : float
+        About which share of its queries it spends one by one. It only tells how long an
+        evaluation may take.
+
+    """
+
+    own_settings: ClassVar[tuple[str, ...]] = ()
+    query_share: ClassVar[float] = 1.0
+
+    def __init__(self, config: AttackConfig) -> None:
+        self.config = config
+
+    @abstractmethod
     def hunt(self, hunt: Hunt, rng: np.random.Generator) -> str:
         """Improve ``hunt.best``; return why it ended."""
-        ...
 
     def guess(self, graph: MultiTierGraph, edit_budget: int,
               rng: np.random.Generator) -> MultiTierGraph:
-        """Return a perturbed graph without a query (surrogate mode)."""
-        ...
+        """Return a perturbed graph without a query (mode surrogate); by default the same."""
+        return graph
 
     def observe(self, graph: MultiTierGraph) -> None:
-        """Remember a graph as it was forwarded; called with each."""
-        ...
+        """Remember a graph as it was forwarded; called with each. By default nothing."""

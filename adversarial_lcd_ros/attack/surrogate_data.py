@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.surrogates import Surrogate
+from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
+
+
+def data_path(config: AttackConfig) -> Path:
+    """Return the file of an attack's surrogate data: one's own, or the one that ships."""
+    return Path(config.surrogate_data) if config.surrogate_data else model_path(SURROGATE_DATA)
 
 
 @dataclass(frozen=True)

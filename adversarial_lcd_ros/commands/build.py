@@ -5,7 +5,14 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_source_options,
+    imported_source,
+    progress_bar,
+    tell,
+)
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.settings import add_config_options, add_models_option, config_from_options
 
@@ -26,6 +33,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML) of graph_builder; options of the command line win '
                         'over it')
+    add_source_options(parser)
     add_models_option(parser)
     # argparse's own usage would be twenty options long before the first explanation.
     parser.usage = f'{parser.prog} SOURCE DESTINATION [OPTIONS]'
@@ -36,10 +44,15 @@ def _build(options: Namespace) -> None:
     from adversarial_lcd_ros.graph_sequences.bags import build_graph_bag
 
     config = config_from_options(options, BuilderConfig)
+    source = imported_source(options.source, options)
     with progress_bar(f'building {Path(options.source).name}') as progress:
-        done = build_graph_bag(options.source, options.destination, config, cache=options.cache,
+        done = build_graph_bag(source, options.destination, config, cache=options.cache,
                                progress=progress, overwrite=options.overwrite)
     graphs = done.graphs.graphs
+    empty = sum(not graph.node_count for graph in graphs)
+    if empty:
+        tell(f'warning: {empty} of {len(graphs)} graphs are empty: no feature and no object was '
+             'found in their pictures, so nothing can be recognised by them')
     print(f'{done.path}: {len(graphs)} graphs, '
           f'{sum(graph.node_count for graph in graphs) / len(graphs):.1f} nodes and '
           f'{sum(graph.edge_count for graph in graphs) / len(graphs):.1f} edges on average, '

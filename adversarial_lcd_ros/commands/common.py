@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import os
+from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -63,6 +64,74 @@ def make_console(*, stderr: bool = False) -> Console:
     known = stream.isatty() or 'COLUMNS' in os.environ
     return Console(width=None if known else TABLE_WIDTH, stderr=stderr, markup=False,
                    emoji=False, highlight=False)
+
+
+def add_source_options(parser: ArgumentParser) -> None:
+    """Declare the options that say how a recording is read; ``source_options`` collects them."""
+    group = parser.add_argument_group('how a recording is read')
+    group.add_argument('--topic', help='bags: topic of the frames, where several hold images')
+    group.add_argument('--ground-truth', metavar='SOURCE', help='file of poses (TUM, KITTI, '
+                       'EuRoC, 4 x 4), or a topic of a bag: PoseStamped, '
+                       'PoseWithCovarianceStamped, Odometry, TransformStamped, Path, /tf; none: '
+                       'use none (default: the only one that the source brings along)')
+    group.add_argument('--rate-hz', type=float, metavar='X', help='sources without time stamps: '
+                       'frames per second (default: 30)')
+    group.add_argument('--stamps', choices=('header', 'log'), help='bags: stamps of the headers, '
+                       'or log times where the headers are wrong (default: header, refused if '
+                       'their clock jumps)')
+    group.add_argument('--fixed-frame', metavar='FRAME', help='bags: frame in which the camera '
+                       'moves, such as world, map, odom')
+    group.add_argument('--body-frame', metavar='FRAME', help='bags: whose poses a PoseStamped '
+                       'or Path holds (default: the camera)')
+    group.add_argument('--camera-frame', metavar='FRAME', help='bags: optical frame of the '
+                       'camera in /tf (default: that of the images, or of their camera_info)')
+    group.add_argument('--extrinsics', nargs='+', metavar='X', help='the optical frame in that '
+                       'of the poses: TX TY TZ QX QY QZ QW, a file of a 4 x 4 matrix, or '
+                       'identity')
+
+
+def source_options(options: Namespace) -> dict[str, Any]:
+    """Return the arguments of ``open_sequence`` that were given; empty if none was."""
+    from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
+    from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
+
+    given = {name: value for name in ('topic', 'ground_truth', 'rate_hz', 'stamps')
+             if (value := getattr(options, name)) is not None}
+    truth = {name: value for name in ('fixed_frame', 'body_frame', 'camera_frame')
+             if (value := getattr(options, name)) is not None}
+    if options.extrinsics:
+        truth['extrinsics'] = parse_extrinsics(options.extrinsics)
+    return {**given, 'truth': TruthOptions(**truth)} if truth else given
+
+
+def imported_source(source: str, options: Namespace, *, replayed: bool = False) -> str:
+    """
+    Return a source that needs no more options: imported on the way where any was given.
+
+    Parameters
+    ----------
+    source : str
+        PATH or PATH@FROM:TO.
+    options : Namespace
+        With those of ``add_source_options``.
+    replayed : bool
+        The nodes are to replay it: it must be a bag as "import" writes it.
+
+    """
+    from adversarial_lcd_ros.errors import ConfigError
+    from adversarial_lcd_ros.sequences.on_the_way import imported
+    from adversarial_lcd_ros.sequences.part import SequencePart
+
+    given = source_options(options)
+    if not given and not replayed:
+        return source
+    path = SequencePart.parse(source).path
+    part = source.rpartition('@')[2] if path != Path(source) else ''
+    if part and replayed:
+        raise ConfigError(f'{source}: a replay takes a whole recording; expected {path}, with '
+                          '--replay-start-s and --replay-duration-s for a part of it')
+    bag = imported(path, given, tell=tell, bar=progress_bar)
+    return f'{bag}@{part}' if part else str(bag)
 
 
 @contextmanager

@@ -6,14 +6,18 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 import sys
+from typing import Any
 
 from adversarial_lcd_ros.commands import evaluate_frames
 from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_source_options,
+    imported_source,
     make_console,
     print_json,
+    source_options,
     tell,
 )
 from adversarial_lcd_ros.config import (
@@ -32,6 +36,7 @@ from adversarial_lcd_ros.settings import (
 )
 from adversarial_lcd_ros.start import ros_problem
 
+RECIPE = 'quick'
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
 LIVE_WINDOW = 4
@@ -50,11 +55,13 @@ def add(commands: Commands) -> None:
         'Replay a bag clean and attacked, or run a recipe of many attacks over sequences, and '
         'report what the attacks cost.', _evaluate)
     parser.add_argument('sources', nargs='+', metavar='SEQUENCE',
-                        help='bag with ground truth, made by "import" or "build"; with a recipe '
+                        help='recording of any form that "import" reads, imported on the way, or '
+                        'a bag made by "build"; with a recipe '
                         'of the protocol "frames" any number of bags or folders, also parts of '
                         'them (PATH@FROM:TO, PATH@0.5:1 is the second half)')
     _add_evaluation_options(parser, 'SEQUENCE [SEQUENCE ...] [OPTIONS]')
     evaluate_frames.add_options(parser)
+    add_source_options(parser)
 
 
 def add_demo(commands: Commands) -> None:
@@ -72,10 +79,10 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         '(default: %(default)s); with the protocol "frames" it is the folder '
                         'itself, and what is finished there is not run again (default: '
                         'results/RECIPE)')
-    parser.add_argument('--recipe', default='quick', metavar='NAME',
+    parser.add_argument('--recipe', metavar='NAME',
                         help='the attacks: a recipe that ships, or a .yaml file like those in '
                         'config/recipes; settings of the attacker given here win over it '
-                        '(default: %(default)s)')
+                        f'(default: {RECIPE}; of a recording of the nodes, what was recorded)')
     parser.add_argument('--rebuild', action='store_true',
                         help='run every attack from the images (default: the first one; the '
                         'others from its clean graphs)')
@@ -94,8 +101,18 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
 
 def _evaluate(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+    from adversarial_lcd_ros.evaluation.replay.recorded import is_recording
 
+    path = Path(options.sources[0])
+    # An attack that is asked for is made anew, of the clean graphs.
+    if (options.recipe is None and not chosen_settings(options, AttackConfig)
+            and len(options.sources) == 1 and is_recording(path)):
+        evaluate_frames.refuse_options(options)
+        _report_recording(path, options)
+        return
+    options.recipe = options.recipe or RECIPE
     if read_recipe(options.recipe)[1]['protocol'] == FRAMES:
+        options.sources = [imported_source(source, options) for source in options.sources]
         evaluate_frames.run(options)
         return
     evaluate_frames.refuse_options(options)
@@ -103,12 +120,22 @@ def _evaluate(options: Namespace) -> None:
         raise ConfigError(f'recipe {options.recipe} replays one bag, found '
                           f'{len(options.sources)}: name one, or a recipe of the protocol '
                           f'"{FRAMES}" such as paper')
-    _evaluate_bag(Path(options.sources[0]), options)
+    _evaluate_bag(Path(imported_source(options.sources[0], options, replayed=True)), options)
+
+
+def _report_recording(bag: Path, options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.replay.recorded import evaluate_recording
+
+    _show(*evaluate_recording(
+        bag, options.output, config_from_options(options, LcdConfig),
+        config_from_options(options, LabelConfig), source=source_options(options),
+        command_line=sys.argv, tell=tell), options)
 
 
 def _demo(options: Namespace) -> None:
     from adversarial_lcd_ros.paths import share_path
 
+    options.recipe = options.recipe or RECIPE
     _evaluate_bag(share_path(DEMO_BAG), options)
 
 
@@ -119,13 +146,6 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
 
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
-    from adversarial_lcd_ros.evaluation.replay.summary import as_document
-    from adversarial_lcd_ros.evaluation.replay.tables import (
-        decline_table,
-        figure_table,
-        sweep_table,
-    )
-    from adversarial_lcd_ros.evaluation.wording import headline
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
     plan = Plan(config_from_options(options, BuilderConfig),
@@ -136,13 +156,26 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
                 attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
                                     keep_recordings=options.keep_recordings)
+    _show(folder, summary, options)
+
+
+def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
+    """Print the tables and the main finding of an evaluation."""
+    from adversarial_lcd_ros.evaluation.replay.summary import as_document
+    from adversarial_lcd_ros.evaluation.replay.tables import (
+        decline_table,
+        figure_table,
+        sweep_table,
+    )
+    from adversarial_lcd_ros.evaluation.wording import headline
+
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
         return
     console = make_console()
     console.print(figure_table(summary))
     console.print(decline_table(summary))
-    if options.sweep_labels:
+    if 'label_sweep' in summary:
         console.print(sweep_table(summary))
     console.print(headline(summary), soft_wrap=True)
     console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',

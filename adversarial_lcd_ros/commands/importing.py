@@ -5,7 +5,13 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_source_options,
+    progress_bar,
+    source_options,
+)
 
 
 def add(commands: Commands) -> None:
@@ -14,15 +20,10 @@ def add(commands: Commands) -> None:
     parser.add_argument('source', type=Path, help='TUM RGB-D folder, folder of images or of '
                         'walks, 7-Scenes sequence, ROS 1 bag, or rosbag2')
     parser.add_argument('destination', type=Path, help='bag to write (rosbag2, MCAP)')
-    parser.add_argument('--topic', help='bags: topic of the frames, where several hold images')
-    parser.add_argument('--ground-truth', metavar='FILE', help='poses in the form of TUM; for '
-                        'bags also a topic of PoseStamped; none: use none (default: what the '
-                        'source brings along)')
-    parser.add_argument('--rate-hz', type=float, metavar='X', help='sources without time stamps: '
-                        'frames per second (default: 30)')
     parser.add_argument('--raw-as', choices=('jpeg', 'png'), default='jpeg', help='how frames '
                         'that come uncompressed are stored (default: %(default)s)')
     parser.add_argument('--overwrite', action='store_true', help='replace a bag that is there')
+    add_source_options(parser)
 
 
 def _import(options: Namespace) -> None:
@@ -31,8 +32,8 @@ def _import(options: Namespace) -> None:
     with progress_bar(f'importing {options.source.name}') as progress:
         done = import_sequence(
             options.source, options.destination, progress=progress, overwrite=options.overwrite,
-            topic=options.topic, ground_truth=options.ground_truth, rate_hz=options.rate_hz,
-            raw_as=options.raw_as)
+            raw_as=options.raw_as, **source_options(options))
     width, height = done.image_size
     print(f'{done.path}: {done.frames} frames of {width} x {height} pixels, {done.poses} poses, '
           f'{done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
+    print(done.coverage)

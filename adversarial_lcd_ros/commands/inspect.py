@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,47 +12,42 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_source_options,
     make_console,
     print_json,
     print_rows,
+    source_options,
 )
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences.inspection import BagSummary
 
+IMAGES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+
 
 def add(commands: Commands) -> None:
     """Declare the command."""
-    parser = add_command(commands, 'inspect', 'Print what a bag, a payload or a results folder '
-                         'holds.', _inspect)
-    parser.add_argument('path', type=Path, help='rosbag2 folder, .mcap, .db3 or .bag file, a file '
-                        'with the payload of one message, or a results folder')
+    parser = add_command(commands, 'inspect', 'Print what a recording, a payload or a results '
+                         'folder holds.', _inspect)
+    parser.add_argument('path', type=Path, help='recording of any form that "import" reads, a '
+                        'file with the payload of one message, or a results folder')
     add_json_option(parser)
+    add_source_options(parser)
 
 
 def _inspect(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.kinds import is_results
     from adversarial_lcd_ros.sequences.bagfile import is_bag
-    from adversarial_lcd_ros.sequences.inspection import (
-        inspect_bag,
-        inspect_payload,
-        payload_values,
-    )
 
-    if is_results(options.path):
-        _show_results(options.path, as_json=options.json)
-    elif options.path.is_file() and not is_bag(options.path):
-        name, content = inspect_payload(options.path)
-        if options.json:
-            print_json({'message': name, **payload_values(content)})
-        else:
-            _show_payload(name, content)
+    path, given = options.path, source_options(options)
+    if is_results(path):
+        _show_results(path, as_json=options.json)
+    elif is_bag(path) or not path.exists():
+        _show_bag(path, given, as_json=options.json)
+    elif path.is_file():
+        _show_file(path, given, as_json=options.json)
     else:
-        bag = inspect_bag(options.path)
-        if options.json:
-            print_json({**asdict(bag), 'path': str(bag.path)})
-        else:
-            _show_bag(bag)
+        _show_sequence(path, given, as_json=options.json)
 
 
 def _show_results(folder: Path, *, as_json: bool) -> None:
@@ -68,7 +64,62 @@ def _show_results(folder: Path, *, as_json: bool) -> None:
         print_rows(table.title, table.rows)
 
 
-def _show_bag(bag: BagSummary) -> None:
+def _show_bag(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
+    from adversarial_lcd_ros.errors import SequenceError
+    from adversarial_lcd_ros.sequences.inspection import inspect_bag, inspect_sequence
+
+    bag, frames = inspect_bag(path), {}
+    if any(topic.type in IMAGES for topic in bag.topics):
+        try:
+            frames = inspect_sequence(path, **given)
+        except SequenceError as error:
+            # What the bag holds is shown: this is what an import would say.
+            frames = {'import': str(error)}
+    if as_json:
+        print_json({**asdict(bag), 'path': str(bag.path), **frames})
+        return
+    _print_bag(bag)
+    _print_words(frames)
+
+
+def _show_file(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
+    from adversarial_lcd_ros.errors import CodecError, SequenceError
+    from adversarial_lcd_ros.sequences.inspection import inspect_payload, payload_values
+
+    try:
+        name, content = inspect_payload(path)
+    except CodecError:
+        # A film, perhaps; where it is no sequence either, what it is no payload of is said.
+        try:
+            _show_sequence(path, given, as_json=as_json)
+        except SequenceError:
+            pass
+        else:
+            return
+        raise
+    if as_json:
+        print_json({'message': name, **payload_values(content)})
+    else:
+        _show_payload(name, content)
+
+
+def _show_sequence(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
+    from adversarial_lcd_ros.sequences.inspection import inspect_sequence
+
+    words = inspect_sequence(path, **given)
+    if as_json:
+        print_json({'path': str(path), **words})
+        return
+    print(path)
+    _print_words(words)
+
+
+def _print_words(words: Mapping[str, str]) -> None:
+    for what, text in words.items():
+        print(f'{what}: {text}')
+
+
+def _print_bag(bag: BagSummary) -> None:
     from rich.table import Table
 
     console = make_console()

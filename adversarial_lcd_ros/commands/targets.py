@@ -13,12 +13,16 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_source_options,
+    imported_source,
     print_json,
     progress_bar,
+    source_options,
     tell,
 )
-from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.settings import add_config_options, add_models_option, chosen_settings
 
 if TYPE_CHECKING:
@@ -44,7 +48,7 @@ def add(commands: Commands) -> None:
                         help='where the sequences of a recipe are (default: %(default)s)')
     parser.add_argument('--output', type=Path, default=Path('results/target'), metavar='FOLDER',
                         help='rows that are there are not run again (default: %(default)s)')
-    parser.add_argument('--targets', nargs='+', choices=TARGETS, metavar='NAME',
+    parser.add_argument('--targets', nargs='+', metavar='NAME',
                         help=f'those to evaluate (default: {" ".join(TARGETS)}, or what the '
                         'recipe says)')
     parser.add_argument('--protocols', nargs='+', choices=PROTOCOLS, default=PROTOCOLS,
@@ -66,6 +70,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
     add_json_option(parser)
+    add_source_options(parser)
     add_models_option(parser)
     for config, prefix in _CONFIGS:
         add_config_options(parser, config, prefix)
@@ -122,8 +127,12 @@ def _sequences(options: Namespace) -> list[TargetSequence]:
     choices = Choices(builder, lcd, labels, tuple(options.nodes or ()),
                       tuple(options.targets or ()))
     if options.recipe:
+        if source_options(options):
+            raise ConfigError('how a recording is read is given for named sequences only: a '
+                              'recipe names its own')
         return recipe_sequences(options.recipe, options.data, choices)
-    return named_sequences(options.sources, choices)
+    return named_sequences([imported_source(source, options) for source in options.sources],
+                           choices)
 
 
 def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTask]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 
 from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
-from adversarial_lcd_ros.config import TARGETS, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 
 
@@ -24,7 +24,7 @@ def add(commands: Commands) -> None:
                         help='where the artefacts and their card go (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=42, metavar='N',
                         help='seed of every random choice (default: %(default)s)')
-    parser.add_argument('--targets', nargs='+', choices=TARGETS, metavar='NAME',
+    parser.add_argument('--targets', nargs='+', metavar='NAME',
                         help='targets to train; the first answers the queries of the surrogate '
                         'data (default: all but gnn, which needs PyTorch)')
     parser.add_argument('--vocabulary', type=Path, metavar='FILE',
@@ -50,9 +50,9 @@ def add(commands: Commands) -> None:
 def _train(options: Namespace) -> None:
     from adversarial_lcd_ros.sequences.part import SequencePart
     from adversarial_lcd_ros.training.run import (
-        DEFAULT_TARGETS,
         TRAINING_LABELS,
         TrainingPlan,
+        default_targets,
         train,
     )
 
@@ -63,7 +63,7 @@ def _train(options: Namespace) -> None:
     plan = TrainingPlan(
         builder, config_from_options(options, LcdConfig),
         replace(TRAINING_LABELS, **chosen_settings(options, LabelConfig)),
-        tuple(options.targets or DEFAULT_TARGETS), options.pairs, options.vocabulary_stride,
+        tuple(options.targets or default_targets()), options.pairs, options.vocabulary_stride,
         flips_per_frame=options.flips_per_frame)
     card = train(sources, options.output, seed=options.seed, plan=plan, stage=progress_bar,
                  overwrite=options.overwrite, command_line=['adversarial-lcd', *sys.argv[1:]],

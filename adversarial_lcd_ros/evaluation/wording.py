@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from adversarial_lcd_ros.evaluation.methods import method_of, surrogate_facts
+from adversarial_lcd_ros.registry import NONE
+
 UNDEFINED = 'n/a'
 _NARROW_SPACE = '\u202f'  # does not break the line
-_SURROGATE = {'svm_rbf': 'SVM-RBF', 'svm_linear': 'SVM-linear', 'svm_poly': 'SVM-polynomial',
-              'naive_bayes': 'naive Bayes', 'svr': 'SVR', 'ard': 'Bayesian ARD'}
 _MODE = {'query': 'query-guided', 'surrogate': 'surrogate only', 'pass': 'forwarded unchanged'}
 
 Attack = Mapping[str, Any]
@@ -20,20 +21,21 @@ def attack_title(attack: Attack) -> str:
         return str(attack['name'])
     if attack['mode'] == 'pass':
         return 'control: forwarded unchanged'
-    return f'{method_title(attack)}, {mode_title(attack["mode"])}'
+    unasked = attack['mode'] == 'surrogate' and not attack['surrogate']
+    return f'{method_title(attack)}, {"no queries" if unasked else mode_title(attack["mode"])}'
 
 
 def method_title(attack: Attack) -> str:
-    """Return perturbation and surrogate of an attack, in words."""
-    perturbation = str(attack['perturbation']).replace('_', ' ')
-    if attack['surrogate'] == 'none':
-        return perturbation
-    return f'{perturbation} + {surrogate_title(attack["surrogate"])}'
+    """Return what looks for the flips of an attack, in words: a surrogate only if one ran."""
+    title = method_of(attack).replace('_', ' ')
+    if attack['surrogate'] in ('', NONE):
+        return title
+    return f'{title} + {surrogate_title(attack["surrogate"])}'
 
 
 def surrogate_title(surrogate: str) -> str:
     """Return a surrogate in words."""
-    return _SURROGATE.get(surrogate, surrogate.replace('_', ' '))
+    return surrogate_facts(surrogate).title or surrogate.replace('_', ' ')
 
 
 def mode_title(mode: str) -> str:
@@ -56,6 +58,10 @@ def mean_count(value: float | None) -> str:
     return number(value, 1 if value is None or value < 100 else 0)
 
 
+def _ratio(value: float | None) -> str:
+    return UNDEFINED if value is None else f'{value:g}'
+
+
 def points(value: float | None) -> str:
     """Return percentage points; what rounds to nothing has no sign."""
     return UNDEFINED if value is None else f'{round(value, 1) + 0.0:.1f}'
@@ -68,15 +74,28 @@ def interval(bounds: Sequence[float] | None, factor: float = 1.0) -> str:
     return ' to '.join(f'{round(factor * bound, 1) + 0.0:.1f}' for bound in bounds)
 
 
+def is_labelled(summary: Mapping[str, Any]) -> bool:
+    """Tell whether there was ground truth to score decisions by."""
+    return bool(summary.get('labelled', True))
+
+
 def strongest(summary: Mapping[str, Any]) -> Attack | None:
-    """Return the attack with the largest decline; None without attacks."""
+    """Return the attack that took, or without ground truth changed, most; None without any."""
     attacks: list[Attack] = summary['attacks']
+    if not is_labelled(summary):
+        return max(attacks, key=lambda attack: int(attack['changed']), default=None)
     return max(attacks, key=lambda attack: -1e9 if attack['decline_pp'] is None
                else attack['decline_pp'], default=None)
 
 
 def headline(summary: Mapping[str, Any]) -> str:
     """Return the main finding in one or two sentences."""
+    if not summary['nodes_mean']:
+        return (f'All {summary["graphs"]} graphs of {summary["sequence"]} are empty: no feature '
+                'and no object was found in the pictures. Nothing could be recognised or '
+                'attacked; the figures say nothing about the detector.')
+    if not is_labelled(summary):
+        return _headline_without_labels(summary)
     attack = strongest(summary)
     name, clean = summary['sequence'], summary['clean']
     if attack is None:
@@ -98,7 +117,23 @@ def headline(summary: Mapping[str, Any]) -> str:
     return (f'The attack took {points(attack["decline_pp"])} points off the balanced accuracy of '
             f'loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
             f'{percent(attack["balanced_accuracy"])} (95{_NARROW_SPACE}% interval of the decline '
-            f'{interval(bounds)}), with {effort}. {_sentence(_changes(summary, attack))}.')
+            f'{interval(bounds)}), with {effort}. {sentence(_changes(summary, attack))}.')
+
+
+def _headline_without_labels(summary: Mapping[str, Any]) -> str:
+    attack, frames = strongest(summary), summary['frames']
+    clean = (f'Without an attack the detector declared {summary["clean"]["loops_declared"]} loops '
+             f'in {frames} frames of {summary["sequence"]}')
+    unknown = 'Without ground truth nobody can say which of them are right'
+    if attack is None:
+        return f'{clean}. {unknown}.'
+    which = 'strongest attack' if len(summary['attacks']) > 1 else 'attack'
+    return (f'{clean}. The {which}, {attack_title(attack)}, changed '
+            f'{attack["changed"]} decisions ({percent(attack["success_rate"])} of the frames that '
+            f'could be attacked): loops silenced {attack["silenced"]}, raised {attack["raised"]}, '
+            f'declared with another frame {attack["redirected"]}, with '
+            f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
+            f'flipped in a graph on average. {unknown}.')
 
 
 def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
@@ -109,16 +144,19 @@ def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
             'left alone')
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
-    """Return the decline table, one row an attack: heading to cell."""
+    """Return the table of what attacks took or changed, one row an attack: heading to cell."""
+    if not is_labelled(summary):
+        return _change_rows(summary)
     clean = summary['clean']
     return [{
         'attack': attack_title(attack),
-        'ratio r': f'{attack["ratio"]:g}',
+        'ratio r': _ratio(attack['ratio']),
         'edits': mean_count(attack['edits_mean']),
         'queries': mean_count(attack['queries_mean']),
         'balanced accuracy': (f'{percent(clean["balanced_accuracy"])} → '
@@ -133,6 +171,8 @@ def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Return the figures of the detector, one row a run: heading to cell."""
+    if not is_labelled(summary):
+        return _declared_rows(summary)
     runs = [('before', summary['clean'])]
     runs += [(attack_title(attack), attack) for attack in summary['attacks']]
     return [{
@@ -146,4 +186,29 @@ def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         'average precision': number(run['average_precision'], 3),
         'MCC': number(run['mcc'], 3),
         'wrong matches': str(run['wrong_matches']),
+    } for title, run in runs]
+
+
+def _change_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    return [{
+        'attack': attack_title(attack),
+        'ratio r': _ratio(attack['ratio']),
+        'edits': mean_count(attack['edits_mean']),
+        'queries': mean_count(attack['queries_mean']),
+        'changed': f'{attack["changed"]} of {summary["frames"]}',
+        'success rate': percent(attack['success_rate']),
+        'silenced': str(attack['silenced']),
+        'raised': str(attack['raised']),
+        'other match': str(attack['redirected']),
+        'unattackable': f'{attack["unattackable"]} of {summary["frames"]}',
+    } for attack in summary['attacks']]
+
+
+def _declared_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    runs = [('before', {**summary['clean'], 'agreement': 1.0})]
+    runs += [(attack_title(attack), attack) for attack in summary['attacks']]
+    return [{
+        'run': title,
+        'loops declared': f'{run["loops_declared"]} of {summary["frames"]}',
+        'decisions as in the clean run': percent(run['agreement']),
     } for title, run in runs]

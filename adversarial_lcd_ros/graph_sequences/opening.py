@@ -10,6 +10,8 @@ import logging
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from adversarial_lcd_ros.codec import decode_graph
 from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
@@ -220,4 +222,5 @@ def _recorded_graphs(part: SequencePart) -> GraphSequence:
     numbers = part.numbers(len(graphs))
     return GraphSequence(_name(part.path.resolve().stem, numbers, len(graphs)),
                          graphs[numbers.start:numbers.stop],
-                         bag_trajectory(part.path, graphs[0].frame_id), sizes[0])
+                         bag_trajectory(part.path, np.array([g.stamp_ns for g in graphs]),
+                                        graphs[0].frame_id), sizes[0])

@@ -144,6 +144,16 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
                        judgement.possible, candidates, located)
 
 
+def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
+    """Return the labels of a replay without ground truth: no frame is scored."""
+    stamps = _checked_stamps(stamp_ns)
+    count = len(stamps)
+    # Views of one value: nothing is known of any pair, and that takes no memory.
+    nothing = np.broadcast_to(np.False_, (count, count))
+    return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
+                       np.zeros(count, np.int64), np.zeros(count, bool))
+
+
 def relation(rows: Trajectory, image_size: tuple[int, int],
              config: LabelConfig) -> NDArray[np.int8]:
     """

@@ -12,11 +12,9 @@ from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database
-from adversarial_lcd_ros.lcd.decision import Decision, probability
-from adversarial_lcd_ros.lcd.geometry import count_inliers
-from adversarial_lcd_ros.lcd.targets import Scores, make_target, prepare
-from adversarial_lcd_ros.lcd.views import Comparison, View
-from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.scoring import Compared, Judge
+from adversarial_lcd_ros.lcd.views import View
 
 CACHED_VIEWS = 256
 
@@ -39,11 +37,10 @@ class QueryNodes:
         vBoW score of each candidate.
     average : float64, (r', r)
         Weight of each reference in the window of each candidate.
-    comparison : Comparison
-    scores : callable
-        Scores of a View with every reference.
-    inliers : dict
-        Keyframe to its matches that passed the geometric check, where that was asked for.
+    compared : Compared
+        With the references.
+    support : dict
+        Candidate, by its place, to how far a loop with it is borne out, where that was asked for.
 
     """
 
@@ -52,9 +49,8 @@ class QueryNodes:
     candidates: list[int]
     bow: list[float]
     average: NDArray[np.float64]
-    comparison: Comparison
-    scores: Scores
-    inliers: dict[int, int] = field(default_factory=dict)
+    compared: Compared
+    support: dict[int, float] = field(default_factory=dict)
 
 
 class LoopClosureDetector:
@@ -69,12 +65,16 @@ class LoopClosureDetector:
 
     def __init__(self, config: LcdConfig | None = None) -> None:
         self.config = config or LcdConfig()
-        path = target_path(self.config.model, self.config.target)
-        self._target = make_target(self.config.target, path.with_suffix('.onnx'))
-        self.decision = Decision.load(path, self._target.name, self._target.channels)
+        self.judging = Judge(self.config)
         self._database = Database()
-        self._view = lru_cache(CACHED_VIEWS)(lambda index: View(self._database[index]))
+        self._view = lru_cache(CACHED_VIEWS)(
+            lambda index: self.judging.scoring.view(self._database[index]))
         self._latest: QueryNodes | None = None
+
+    @property
+    def decision(self) -> Decision:
+        """The trained decision."""
+        return self.judging.decision
 
     @property
     def keyframe_count(self) -> int:
@@ -107,34 +107,38 @@ class LoopClosureDetector:
                                is_loop=False, probability=0.0)
         logit = self.log_odds(graph)
         best = int(logit.argmax())
-        keyframe = nodes.candidates[best]
-        chance = probability(float(logit[best]))
-        match = self._database[keyframe]
-        is_loop = chance >= self.config.threshold
-        if is_loop and self.config.geometric_check:
-            share = self._inliers(graph, keyframe) / self.config.geometric_inliers
-            if share < 1:
-                is_loop, chance = False, self.config.threshold * share
+        match = self._database[nodes.candidates[best]]
+        is_loop, chance = self.judging.verdict(float(logit[best]),
+                                               lambda: self.support(graph, best))
         return LoopClosure(
             graph.stamp_ns, graph.frame_id, graph.sequence,
             is_loop=is_loop, probability=chance,
             match_stamp_ns=match.stamp_ns, match_sequence=match.sequence,
             vbow_score=nodes.bow[best], candidates=len(nodes.candidates))
 
-    def _inliers(self, graph: MultiTierGraph, keyframe: int) -> int:
-        """Return how many matches with a keyframe agree on one motion; flips do not change it."""
-        inliers = self.query_nodes(graph).inliers
-        if keyframe not in inliers:
-            inliers[keyframe] = count_inliers(graph, self._database[keyframe],
-                                              self.config.geometric_threshold_px)
-        return inliers[keyframe]
+    def support(self, graph: MultiTierGraph, candidate: int) -> float:
+        """Return how far a loop with a candidate is borne out; flips of edges do not change it."""
+        nodes = self.query_nodes(graph)
+        if candidate not in nodes.support:
+            nodes.support[candidate] = self.judging.scoring.support(
+                graph, self._database[nodes.candidates[candidate]])
+        return nodes.support[candidate]
+
+    def verdict_log_odds(self, graph: MultiTierGraph) -> float:
+        """Return the log odds in a soft answer; -inf without a candidate."""
+        logits = self.log_odds(graph)
+        if not len(logits):
+            return -np.inf
+        return float(self.judging.verdict_logits(
+            logits[None], lambda candidate: self.support(graph, candidate))[0])
 
     def log_odds(self, graph: MultiTierGraph) -> NDArray[np.float64]:
         """Return the log odds of a loop with each candidate, the most alike by words first."""
         nodes = self.query_nodes(graph)
         if not nodes.candidates:
             return np.zeros(0)
-        return self.decision.logit(nodes.average @ nodes.scores(View(graph, nodes.base)))
+        view = self.judging.scoring.view(graph, nodes.base)
+        return self.decision.logit(nodes.average @ nodes.compared.scores(view))
 
     def query_nodes(self, graph: MultiTierGraph) -> QueryNodes:
         """Return what flips of a graph leave alone; kept until other nodes are asked about."""
@@ -153,10 +157,10 @@ class LoopClosureDetector:
         average = np.zeros((len(around), len(keyframes)))
         for row, window in zip(average, around, strict=True):
             row[np.searchsorted(keyframes, window)] = 1 / len(window)
-        query = View(graph)
-        comparison = Comparison(query, [self._view(keyframe) for keyframe in keyframes])
-        return QueryNodes(key, query, candidates, bow, average, comparison,
-                          prepare(self._target, query, comparison))
+        query = self.judging.scoring.view(graph)
+        compared = self.judging.scoring.compare(
+            query, [self._view(keyframe) for keyframe in keyframes])
+        return QueryNodes(key, query, candidates, bow, average, compared)
 
     def _window(self, candidate: int, old: NDArray[np.bool_]) -> list[int]:
         """Return the candidate and the keyframes around it that are old enough, too."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 import math
 from typing import Any
@@ -20,6 +21,24 @@ from adversarial_lcd_ros.lcd.kernels import MIN_COSINE
 _BITS = 8 * DESCRIPTOR_BYTES
 # The largest distance whose cosine, 1 - 2 distance / bits, is above MIN_COSINE.
 _FARTHEST = math.ceil((1 - MIN_COSINE) * _BITS / 2) - 1
+
+
+# Tells which edges may recur: ``Comparison.with_credit``.
+Keeps = Callable[['View', 'View', NDArray[np.int64], NDArray[np.int64]], NDArray[np.bool_]]
+
+
+class Feels(Enum):
+    """Flips of edges that can make a difference."""
+
+    EVERY = 'every'
+    AT_OBJECTS = 'at_objects'
+    NONE = 'none'
+
+    def among(self, pairs: NDArray[np.int64], objects: int) -> NDArray[np.bool_]:
+        """Return which of (k, 2) pairs, source < target, can; objects are the first nodes."""
+        if self is Feels.AT_OBJECTS:
+            return pairs[:, 0] < objects
+        return np.full(len(pairs), self is Feels.EVERY)
 
 
 class View:
@@ -125,6 +144,7 @@ class Comparison:
         self._query = query
         self._query_nodes = query.graph.node_count
         self._query_labels = query.graph.label[:query.objects]
+        self._keeps: tuple[Keeps, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of references, r."""
@@ -228,12 +248,34 @@ class Comparison:
             node[match.reference], weight[match.reference] = match.query, match.weight
             u, v = node[view.graph.edge[:, 0]], node[view.graph.edge[:, 1]]
             both = (u >= 0) & (v >= 0)
+            for keeps in self._keeps:
+                ends = np.stack([u[both], v[both]], axis=1)
+                both[both] = keeps(self._query, view, ends, view.graph.edge[both].astype(np.int64))
             keys.append((np.minimum(u, v) * self._query_nodes + np.maximum(u, v))[both])
             weights.append((weight[view.graph.edge[:, 0]] * weight[view.graph.edge[:, 1]])[both])
             owners.append(np.full(len(keys[-1]), owner))
         key = _join(keys, np.int64)
         order = np.argsort(key, kind='stable')
         return key[order], _join(weights, np.float64)[order], _join(owners, np.int64)[order]
+
+
+    def with_credit(self, keeps: Keeps) -> Comparison:
+        """
+        Return the same comparison with part of its ``credit``.
+
+        Parameters
+        ----------
+        keeps : callable
+            Given the query, a reference, (c, 2) pairs of the query's nodes and the reference's
+            edges (c, 2) that would recur there, in the same order of ends: which may, (c,).
+
+        """
+        kept = Comparison(self._query, self.references)
+        # Matches, and what hangs on them alone, are not computed twice.
+        kept.__dict__.update({name: value for name, value in self.__dict__.items()
+                              if name != 'credit'})
+        kept._keeps = (*self._keeps, keeps)
+        return kept
 
 
 def _join(parts: Sequence[NDArray[Any]], dtype: type, *tail: int) -> NDArray[Any]:

@@ -64,7 +64,7 @@ def _descriptor(entry: Field[Any]) -> ParameterDescriptor:
     choices = entry.metadata['choices']
     descriptor = ParameterDescriptor(
         description=entry.metadata['help'], read_only=True,
-        additional_constraints=f'one of {", ".join(choices)}' if choices else '')
+        additional_constraints=limits(entry) if choices else '')
     low, high = entry.metadata['low'], entry.metadata['high']
     if low is None and high is None:
         return descriptor

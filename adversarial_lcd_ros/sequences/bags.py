@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, POSE, BagFile
+from adversarial_lcd_ros.sequences.bag_truth import BagTruth, TruthOptions
+from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, BagFile
 from adversarial_lcd_ros.sequences.frame import RAW_CHANNELS, Frame, open_compressed
-from adversarial_lcd_ros.sequences.sequence import Sequence, check_order
-from adversarial_lcd_ros.sequences.trajectory import Trajectory, read_trajectory
-from adversarial_lcd_ros.sequences.transforms import tf_trajectory
+from adversarial_lcd_ros.sequences.sequence import Sequence
+from adversarial_lcd_ros.sequences.stamps import LOG, frame_stamps
+from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
-TRUTH_TOPIC = '/ground_truth'
-NO_TRUTH = 'none'
 # image_transport puts depth into CompressedImage, too.
 _DEPTH = 'compresseddepth'
 
 
-def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None) -> Sequence:
+def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,
+                 truth: TruthOptions | None = None, stamps: str | None = None) -> Sequence:
     """
     Open a bag as a sequence.
 
@@ -32,41 +34,55 @@ def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None)
     topic : str or None
         Of the frames; None: the only one that holds camera images (depth does not count).
     ground_truth : Path, str or None
-        A file in TUM's form, a topic of the bag (geometry_msgs/PoseStamped), or 'none'. None:
-        a groundtruth.txt beside a single-file bag, else the poses in the bag, else its /tf.
+        A topic of the bag, a file of poses, or 'none'; see ``BagTruth.find``.
+    truth : TruthOptions, optional
+        How poses become those of the camera.
+    stamps : str, optional
+        Of the frames: 'header' or 'log'; see ``frame_stamps``.
 
     """
     with BagFile(path) as bag:
         chosen = topic if topic is not None else _find_topic(bag)
         _check_topic(bag, chosen)
-        stamps = check_order([bag.stamp_ns(wire) for _, _, wire in bag.messages([chosen])], path)
+        stamps_ns = _frame_stamps(bag, chosen, stamps)
         first = next(iter(bag.messages([chosen])))[2]
         message = bag.decode(chosen, first)
         size = _size(message, _what(path, chosen, 0))
-        trajectory = _trajectory(bag, ground_truth, message.header.frame_id)
+        found = BagTruth(bag, stamps_ns, (chosen, message.header.frame_id), truth,
+                         stamps).find(ground_truth)
 
     def read(wanted: range) -> Iterator[Frame]:
         with BagFile(path) as source:
             messages = islice(source.messages([chosen]), wanted.start, wanted.stop, wanted.step)
-            for number, (_, _, wire) in zip(wanted, messages, strict=False):
-                yield _frame(source.decode(chosen, wire), _what(path, chosen, number), size)
+            for number, (_, log_ns, wire) in zip(wanted, messages, strict=False):
+                frame = _frame(source.decode(chosen, wire), _what(path, chosen, number), size)
+                yield replace(frame, stamp_ns=log_ns) if stamps == LOG else frame
 
-    return Sequence(path.resolve().stem, path, stamps, size, trajectory, read)
+    return Sequence(path.resolve().stem, path, stamps_ns, size, found.trajectory, read,
+                    truth=found.text)
 
 
-def bag_trajectory(path: Path, camera_frame: str = '') -> Trajectory | None:
+def bag_trajectory(path: Path, stamps_ns: NDArray[np.int64],
+                   camera_frame: str = '') -> Trajectory | None:
     """
     Return the ground truth of a bag, with or without images; None where it has none.
 
     Parameters
     ----------
     path : Path
+    stamps_ns : int64, (n,)
+        Of the frames.
     camera_frame : str
         The camera's frame on /tf, where that is all there is.
 
     """
     with BagFile(path) as bag:
-        return _trajectory(bag, None, camera_frame)
+        return BagTruth(bag, stamps_ns, ('', camera_frame)).find(None).trajectory
+
+
+def _frame_stamps(bag: BagFile, topic: str, stamps: str | None) -> NDArray[np.int64]:
+    rows = [(bag.stamp_ns(wire), log_ns) for _, log_ns, wire in bag.messages([topic])]
+    return frame_stamps([stamp for stamp, _ in rows], [log for _, log in rows], bag.path, stamps)
 
 
 def _what(path: Path, topic: str, number: int) -> str:
@@ -125,41 +141,3 @@ def _frame(message: Any, what: str, size: tuple[int, int] | None) -> Frame:
                             f'{height} pixels of {message.encoding} in rows of {step}')
     rows = np.frombuffer(message.data, np.uint8, step * height).reshape(height, step)
     return Frame(stamp_ns, rows[:, :width * channels].tobytes(), message.encoding, width, height)
-
-
-def _trajectory(bag: BagFile, ground_truth: Path | str | None,
-                camera_frame: str) -> Trajectory | None:
-    if ground_truth == NO_TRUTH:
-        return None
-    if ground_truth is not None:
-        if str(ground_truth) in bag.of_type(POSE):
-            return _poses(bag, str(ground_truth))
-        return read_trajectory(Path(ground_truth))
-    beside = bag.path.parent / 'groundtruth.txt'
-    if bag.path.is_file() and beside.exists():
-        return read_trajectory(beside)
-    topics = bag.of_type(POSE)
-    if TRUTH_TOPIC in topics:
-        topics = [TRUTH_TOPIC]
-    if len(topics) > 1:
-        raise SequenceError(f'bag {bag.path} has poses on {", ".join(topics)}: name the topic of '
-                            f'the ground truth, a file, or "{NO_TRUTH}"')
-    return _poses(bag, topics[0]) if topics else tf_trajectory(bag, camera_frame)
-
-
-def _poses(bag: BagFile, topic: str) -> Trajectory:
-    messages = [bag.decode(topic, wire) for _, _, wire in bag.messages([topic])]
-    frames = sorted({message.header.frame_id for message in messages})
-    if len(frames) != 1:
-        raise SequenceError(f'bag {bag.path}: the poses on {topic} are in several frames: '
-                            f'{", ".join(frames)}')
-    stamps = [int(m.header.stamp.sec) * 1_000_000_000 + int(m.header.stamp.nanosec)
-              for m in messages]
-    places = [(m.pose.position.x, m.pose.position.y, m.pose.position.z) for m in messages]
-    turns = [(m.pose.orientation.x, m.pose.orientation.y, m.pose.orientation.z,
-              m.pose.orientation.w) for m in messages]
-    try:
-        return Trajectory(np.array(stamps, np.int64), np.array(places), np.array(turns),
-                          frames[0])
-    except SequenceError as error:
-        raise SequenceError(f'bag {bag.path}, {topic}: {error}') from None

@@ -8,18 +8,22 @@ import re
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame, open_compressed
+from adversarial_lcd_ros.sequences.frame_poses import image_poses, read_poses
+from adversarial_lcd_ros.sequences.pose_files import (
+    check_pose_matrix,
+    matrix_trajectory,
+    read_matrices,
+)
 from adversarial_lcd_ros.sequences.sequence import Sequence
+from adversarial_lcd_ros.sequences.text_files import text_rows
 from adversarial_lcd_ros.sequences.trajectory import (
     PLACE_INDEX,
     Trajectory,
     parse_stamp_ns,
-    read_trajectory,
-    text_rows,
 )
 
 TUM_IMAGES, TUM_TRUTH = 'rgb.txt', 'groundtruth.txt'
@@ -28,7 +32,6 @@ DEFAULT_RATE_HZ = 30.0
 WALK_GAP_S = 60.0
 _SUFFIXES = ('.jpg', '.jpeg', '.png')
 _SEVEN_SCENES_COLOUR = '.color.png'
-_ORTHOGONAL_TOLERANCE = 0.01
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -62,7 +65,7 @@ def tum_folder(folder: Path, ground_truth: Path | None) -> Sequence:
             raise SequenceError(f'{where}: there is no image {paths[-1]}')
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
-    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
+    trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
     return _sequence(folder, paths, stamps, trajectory)
 
 
@@ -81,7 +84,7 @@ def detections_folder(folder: Path, ground_truth: Path | None) -> Sequence:
     sample = _open(samples[0], 0, None)
     if ground_truth is None and (folder / TUM_TRUTH).exists():
         ground_truth = folder / TUM_TRUTH
-    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
+    trajectory = None if ground_truth is None else read_poses(ground_truth, stamps)
 
     def read(wanted: range) -> Iterator[Frame]:
         for number in wanted:
@@ -95,19 +98,13 @@ def image_folder(folder: Path, ground_truth: Path | None, rate_hz: float | None)
     """
     Open a folder of images in order of their names.
 
-    With ground truth and no rate, pose i belongs to image i and stamps it. With a rate, the
-    first image is taken with the first pose (or at 0), the others at this rate.
+    Where there is ground truth, ``image_poses`` tells which pose is that of which image.
     """
     paths = images_in(folder)
-    trajectory = None if ground_truth is None else read_trajectory(ground_truth)
-    if trajectory is not None and rate_hz is None:
-        if len(trajectory) != len(paths):
-            raise SequenceError(
-                f'{folder} holds {len(paths)} images, {ground_truth} {len(trajectory)} poses: '
-                'expected one pose per image, or the rate of the images in Hz, or "none"')
-        return _sequence(folder, paths, trajectory.stamp_ns, trajectory)
-    start_ns = 0 if trajectory is None else int(trajectory.stamp_ns[0])
-    return _sequence(folder, paths, start_ns + _ticks(len(paths), rate_hz), trajectory)
+    ticks = _ticks(len(paths), rate_hz)
+    if ground_truth is None:
+        return _sequence(folder, paths, ticks, None)
+    return _sequence(folder, paths, *image_poses(ground_truth, ticks, rate_hz is not None))
 
 
 def walk_folders(folder: Path, walks: dict[Path, list[Path]],
@@ -145,23 +142,12 @@ def seven_scenes(folder: Path, rate_hz: float | None) -> Sequence:
     poses = np.stack([_pose_matrix(
         path.with_name(path.name.replace(_SEVEN_SCENES_COLOUR, '.pose.txt'))) for path in paths])
     stamps = _ticks(len(paths), rate_hz)
-    quaternion = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
-    return _sequence(folder, paths, stamps, Trajectory(stamps, poses[:, :3, 3], quaternion))
+    return _sequence(folder, paths, stamps, matrix_trajectory(stamps, poses))
 
 
 def _pose_matrix(path: Path) -> NDArray[np.float64]:
-    try:
-        matrix = np.array([[float(text) for text in fields]
-                           for _, fields in text_rows(path, 'r r r t')])
-    except ValueError as error:
-        raise SequenceError(f'{path}: {error}') from None
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise SequenceError(f'{path}: expected 4 rows of 4 finite numbers')
-    turn = matrix[:3, :3]
-    if (np.abs(turn @ turn.T - np.eye(3)).max() > _ORTHOGONAL_TOLERANCE
-            or np.linalg.det(turn) < 0):
-        raise SequenceError(f'{path}: the first 3 x 3 numbers are no rotation')
-    return matrix
+    matrices = read_matrices(path)
+    return check_pose_matrix(matrices[0] if len(matrices) == 1 else matrices, str(path))
 
 
 def _ticks(count: int, rate_hz: float | None) -> NDArray[np.int64]:

@@ -12,10 +12,12 @@ import numpy as np
 
 from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
+from adversarial_lcd_ros.sequences.sequence import Coverage, Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
@@ -37,12 +39,15 @@ class ImportSummary:
     image_size: tuple[int, int]
     duration_s: float
     size_bytes: int
+    coverage: Coverage
 
 
 def import_sequence(source: Path | str, destination: Path | str, *,
                     progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
                     topic: str | None = None, ground_truth: Path | str | None = None,
-                    rate_hz: float | None = None, raw_as: str = JPEG) -> ImportSummary:
+                    rate_hz: float | None = None, raw_as: str = JPEG,
+                    truth: TruthOptions | None = None,
+                    stamps: str | None = None) -> ImportSummary:
     """
     Write a sequence as a rosbag2 in MCAP.
 
@@ -54,7 +59,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
 
     Parameters
     ----------
-    source, topic, ground_truth, rate_hz
+    source, topic, ground_truth, rate_hz, truth, stamps
         See ``open_sequence``.
     destination : Path or str
         Folder of the bag; it appears when it is complete, or not at all.
@@ -75,7 +80,8 @@ def import_sequence(source: Path | str, destination: Path | str, *,
     if raw_as not in (JPEG, PNG):
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
-        sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz)
+        sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz,
+                                 truth=truth, stamps=stamps)
         poses = list(pose_messages(sequence.trajectory, int(sequence.stamps_ns[0]),
                                    int(sequence.stamps_ns[-1])))
         frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
@@ -85,11 +91,15 @@ def import_sequence(source: Path | str, destination: Path | str, *,
             bag.write(message_topic, message_type, stamp_ns, cdr)
         for file in _terms(Path(source)):
             bag.attach(file)
-    path = Path(destination)
+    return _summary(Path(destination), sequence, len(poses))
+
+
+def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
+    stamps = sequence.stamps_ns
     return ImportSummary(
-        path, sequence.name, sequence.frame_count, len(poses),
-        sequence.image_size, float(sequence.stamps_ns[-1] - sequence.stamps_ns[0]) / 1e9,
-        sum(file.stat().st_size for file in path.iterdir()))
+        path, sequence.name, sequence.frame_count, poses, sequence.image_size,
+        float(stamps[-1] - stamps[0]) / 1e9, sum(file.stat().st_size for file in path.iterdir()),
+        sequence.coverage)
 
 
 def _terms(source: Path) -> list[Path]:

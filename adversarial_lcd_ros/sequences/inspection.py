@@ -14,6 +14,7 @@ from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagFile
+from adversarial_lcd_ros.sequences.opening import open_sequence
 
 _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
     'MultiTierGraph': codec.decode_graph,
@@ -95,6 +96,33 @@ def inspect_bag(path: Path) -> BagSummary:
     with BagFile(path) as bag:
         return BagSummary(path, bag.duration_s,
                           tuple(_topic(bag, name) for name in sorted(bag.topics)))
+
+
+def inspect_sequence(path: Path, **options: Any) -> dict[str, str]:
+    """
+    Return what an import of a recording would give, in words.
+
+    Parameters
+    ----------
+    path : Path
+    **options
+        See ``open_sequence``.
+
+    Raises
+    ------
+    SequenceError
+        It cannot be opened.
+
+    """
+    sequence = open_sequence(path, **options)
+    stamps = sequence.stamps_ns
+    gap_s = np.diff(stamps) / 1e9
+    width, height = sequence.image_size
+    words = {'frames': f'{sequence.frame_count} of {width} x {height} pixels',
+             'time': f'{float(stamps[-1] - stamps[0]) / 1e9:.1f} s'}
+    if len(gap_s):
+        words['between frames'] = f'{np.median(gap_s):.3f} s (longest {gap_s.max():.3f} s)'
+    return {**words, 'ground truth': str(sequence.coverage)}
 
 
 def _topic(bag: BagFile, name: str) -> TopicSummary:

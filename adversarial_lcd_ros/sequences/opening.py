@@ -8,10 +8,13 @@ from pathlib import Path
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import folders
+from adversarial_lcd_ros.sequences.bag_truth import NO_TRUTH, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import is_bag
-from adversarial_lcd_ros.sequences.bags import NO_TRUTH, bag_sequence
+from adversarial_lcd_ros.sequences.bags import bag_sequence
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE
+from adversarial_lcd_ros.sequences.pose_files import mounted
 from adversarial_lcd_ros.sequences.sequence import Sequence
+from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX
 
 _LAYOUTS = ('a TUM RGB-D folder (rgb.txt), a folder of JPEG or PNG images, a folder of walks '
             '(subfolders of images), a 7-Scenes sequence (frame-000000.color.png), a folder of '
@@ -20,7 +23,8 @@ _LAYOUTS = ('a TUM RGB-D folder (rgb.txt), a folder of JPEG or PNG images, a fol
 
 def open_sequence(path: Path | str, *, topic: str | None = None,
                   ground_truth: Path | str | None = None,
-                  rate_hz: float | None = None) -> Sequence:
+                  rate_hz: float | None = None, truth: TruthOptions | None = None,
+                  stamps: str | None = None) -> Sequence:
     """
     Open a sequence, whatever it was published as.
 
@@ -33,10 +37,14 @@ def open_sequence(path: Path | str, *, topic: str | None = None,
     topic : str, optional
         Bags: the topic of the frames, where several hold camera images.
     ground_truth : Path or str, optional
-        A file in TUM's form (``timestamp tx ty tz qx qy qz qw``); for bags also a topic of
-        geometry_msgs/PoseStamped; 'none': use none. By default what the source brings along.
+        A file of poses (``frame_poses.read_poses``); for bags also a topic (``BagTruth``);
+        'none': use none. By default what the source brings along.
     rate_hz : float, optional
         Sources without time stamps: frames per second, 30 unless given.
+    truth : TruthOptions, optional
+        How poses become those of the camera; sources other than bags know only extrinsics.
+    stamps : str, optional
+        Bags: 'header' or 'log', where the stamps are from.
 
     Returns
     -------
@@ -54,12 +62,21 @@ def open_sequence(path: Path | str, *, topic: str | None = None,
         raise SequenceError(f'there is no sequence {path}')
     if rate_hz is not None and not (math.isfinite(rate_hz) and 0 < rate_hz <= 1e6):
         raise SequenceError(f'rate of {rate_hz} Hz: expected more than 0')
+    if not (path / folders.TUM_IMAGES).is_file() and is_bag(path):
+        _refuse(path, rate_hz=rate_hz)
+        return bag_sequence(path, topic, ground_truth, truth, stamps)
+    options = truth or TruthOptions()
+    _refuse(path, stamps=stamps, fixed_frame=options.fixed_frame, body_frame=options.body_frame,
+            camera_frame=options.camera_frame)
+    return _with_extrinsics(_open(path, topic, ground_truth, rate_hz), options)
+
+
+def _open(path: Path, topic: str | None, ground_truth: Path | str | None,
+          rate_hz: float | None) -> Sequence:
+    """Open a source that is no bag."""
     if path.is_dir() and (path / folders.TUM_IMAGES).is_file():
         _refuse(path, topic=topic, rate_hz=rate_hz)
         return _without_truth(folders.tum_folder(path, _file(ground_truth)), ground_truth)
-    if is_bag(path):
-        _refuse(path, rate_hz=rate_hz)
-        return bag_sequence(path, topic, ground_truth)
     if not path.is_dir():
         raise SequenceError(f'{path} is no sequence: expected {_LAYOUTS}; unpack an archive first')
     _refuse(path, topic=topic)
@@ -97,6 +114,17 @@ def _without_truth(sequence: Sequence, ground_truth: Path | str | None) -> Seque
     if ground_truth != NO_TRUTH:
         return sequence
     return replace(sequence, trajectory=None)
+
+
+def _with_extrinsics(sequence: Sequence, options: TruthOptions) -> Sequence:
+    """Return the sequence with the poses of the camera, where the source has those of a body."""
+    poses = sequence.trajectory
+    if options.extrinsics is None:
+        return sequence
+    if poses is None or poses.frame_id == PLACE_INDEX:
+        raise SequenceError(f'extrinsics given, but {sequence.source} has no poses in metres: '
+                            'leave them out')
+    return replace(sequence, trajectory=mounted(poses, options.extrinsics))
 
 
 def _refuse(path: Path, **options: object) -> None:

@@ -32,6 +32,7 @@ from adversarial_lcd_ros.sequences.bagfile import (
 )
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 from adversarial_lcd_ros.sequences.sequence import check_order
+from adversarial_lcd_ros.sequences.stamps import frame_stamps
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -89,9 +90,7 @@ class Replay:
             self.topics = {topic: bag.topics[topic]
                            for topic in (self._frame_topic, *self._beside)}
             self.frame_topics = (self._frame_topic,)
-            stamps = check_order(
-                [_stamp_ns(bag.topics[topic], wire)
-                 for topic, _, wire in bag.messages([self._frame_topic])], self._path)
+            stamps = _frame_stamps(bag, self._frame_topic)
         self._select(stamps)
         self.frame_count = len(self._kept) * config.loop
 
@@ -149,6 +148,16 @@ def _frame_topic(bag: BagFile) -> str:
     there = ', '.join(f'{topic} ({kind})' for topic, kind in sorted(bag.topics.items()))
     raise SequenceError(f'bag {bag.path} has neither images nor graphs to replay; it has '
                         f'{there or "no topics"}')
+
+
+def _frame_stamps(bag: BagFile, topic: str) -> NDArray[np.int64]:
+    kind = bag.topics[topic]
+    rows = [(_stamp_ns(kind, wire), log_ns) for _, log_ns, wire in bag.messages([topic])]
+    headers = [stamp for stamp, _ in rows]
+    if kind == PAYLOAD:
+        # What the pipeline recorded itself may be faster than its stamps.
+        return check_order(headers, bag.path)
+    return frame_stamps(headers, [log for _, log in rows], bag.path)
 
 
 def _name(topic: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,40 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.frame import Frame
 from adversarial_lcd_ros.sequences.trajectory import TOLERANCE_NS, Trajectory
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """
+    How much of a sequence has ground truth; as a text, what every import ends with.
+
+    Attributes
+    ----------
+    frames, posed_frames : int
+        All, and those with a pose near them.
+    posed_s : float
+        From the first to the last of these, seconds.
+    path_m : float
+        Length of the path between, metres; NaN for places by index.
+    truth : str
+        Where the poses are from, or why there are none.
+
+    """
+
+    frames: int
+    posed_frames: int
+    posed_s: float
+    path_m: float
+    truth: str
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        if not self.posed_frames:
+            return f'no ground truth: {self.truth or "the source has none"}'
+        path = 'places by index' if math.isnan(self.path_m) else f'a path of {self.path_m:.2f} m'
+        return (f'{self.posed_frames} of {self.frames} frames have a pose, over '
+                f'{self.posed_s:.1f} s and {path}'
+                + (f'; ground truth: {self.truth}' if self.truth else ''))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +69,8 @@ class Sequence:
         Returns an iterator of the frames of these numbers; use ``frames``.
     detections : Path or None
         Where the frames have no pictures: the file of what was detected in them.
+    truth : str
+        In words: where the ground truth is from, or why there is none.
 
     Raises
     ------
@@ -49,6 +86,7 @@ class Sequence:
     trajectory: Trajectory | None
     read: Callable[[range], Iterator[Frame]]
     detections: Path | None = None
+    truth: str = ''
 
     def __post_init__(self) -> None:
         """Check the order of the frames, and that the ground truth is theirs."""
@@ -64,6 +102,16 @@ class Sequence:
     def frame_count(self) -> int:
         """Number of frames."""
         return len(self.stamps_ns)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Which of the frames have ground truth."""
+        if self.trajectory is None:
+            return Coverage(self.frame_count, 0, 0.0, 0.0, self.truth)
+        # At least one has: a sequence without is refused.
+        posed = self.stamps_ns[self.trajectory.is_near(self.stamps_ns)]
+        return Coverage(self.frame_count, len(posed), float(posed[-1] - posed[0]) / 1e9,
+                        self.trajectory.at(posed).length_m, self.truth)
 
     def frames(self, start: int = 0, stop: int | None = None, stride: int = 1,
                ) -> Iterator[Frame]:

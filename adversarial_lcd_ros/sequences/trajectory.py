@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
-import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +14,7 @@ from adversarial_lcd_ros.errors import SequenceError
 WORLD, PLACE_INDEX = 'world', 'place_index'
 TOLERANCE_NS = 50_000_000
 # Ground truth in text has four digits or more; beyond this it is no unit quaternion.
-_NORM_TOLERANCE = 0.01
+NORM_TOLERANCE = 0.01
 # Stamps are int64 nanoseconds.
 _MAX_SECONDS = 2**33
 
@@ -71,7 +68,7 @@ class Trajectory:
                                 'infinity: leave out what was not measured')
         norm = np.linalg.norm(self.quaternion, axis=1)
         worst = int(np.argmax(np.abs(norm - 1)))
-        if abs(norm[worst] - 1) > _NORM_TOLERANCE:
+        if abs(norm[worst] - 1) > NORM_TOLERANCE:
             raise SequenceError(f'pose {worst} of the ground truth has a quaternion of norm '
                                 f'{norm[worst]:.4g}: expected 1, in the order x y z w')
         late = np.flatnonzero(np.diff(self.stamp_ns) <= 0)
@@ -132,6 +129,13 @@ class Trajectory:
         return Trajectory(self.stamp_ns[kept], self.position[kept], self.quaternion[kept],
                           self.frame_id)
 
+    @property
+    def length_m(self) -> float:
+        """Length of the path from pose to pose, metres; NaN for a place index."""
+        if self.frame_id == PLACE_INDEX:
+            return float('nan')
+        return float(np.linalg.norm(np.diff(self.position, axis=0), axis=1).sum())
+
     def _nearest(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
         after = np.minimum(np.searchsorted(self.stamp_ns, stamps), len(self) - 1)
         before = np.maximum(after - 1, 0)
@@ -163,69 +167,3 @@ def parse_stamp_ns(text: str) -> int:
     if not (seconds.is_finite() and 0 <= seconds < _MAX_SECONDS):
         raise ValueError(f'{text!r} is no time stamp in seconds')
     return int(seconds * 1_000_000_000)
-
-
-def text_rows(path: Path, columns: str) -> Iterator[tuple[str, list[str]]]:
-    """
-    Yield ('file, line n', fields) of a text in TUM's form: blanks apart, # for comments.
-
-    Raises
-    ------
-    SequenceError
-        The file is missing, is no text, or a line has the wrong number of fields.
-
-    """
-    expected = len(columns.split())
-    try:
-        lines = path.read_text(encoding='utf-8').splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise SequenceError(f'{path} cannot be read: {error}') from error
-    for number, line in enumerate(lines, 1):
-        fields = line.split('#', 1)[0].split()
-        if fields and len(fields) != expected:
-            raise SequenceError(f'{path}, line {number}: {len(fields)} fields; expected '
-                                f'{expected}: {columns}')
-        if fields:
-            yield f'{path}, line {number}', fields
-
-
-def read_trajectory(path: Path) -> Trajectory:
-    """
-    Read ground truth in TUM's form: ``timestamp tx ty tz qx qy qz qw`` (seconds, metres).
-
-    Motion capture writes some stamps twice (rounded to 0.1 ms): the first pose is kept.
-
-    Raises
-    ------
-    SequenceError
-        The file is missing or empty, or a line is malformed, not finite, or out of order.
-
-    """
-    stamps: list[int] = []
-    poses: list[list[float]] = []
-    for where, fields in text_rows(path, 'timestamp tx ty tz qx qy qz qw'):
-        try:
-            stamp_ns, values = parse_stamp_ns(fields[0]), [float(text) for text in fields[1:]]
-        except ValueError as error:
-            raise SequenceError(f'{where}: {error}') from None
-        _check_pose(values, where)
-        if stamps and stamp_ns < stamps[-1]:
-            raise SequenceError(f'{where}: {fields[0]} s is earlier than the line before it; '
-                                'sort the file by time')
-        if not stamps or stamp_ns > stamps[-1]:
-            stamps.append(stamp_ns)
-            poses.append(values)
-    if not stamps:
-        raise SequenceError(f'{path} holds no pose: expected timestamp tx ty tz qx qy qz qw')
-    array = np.asarray(poses)
-    return Trajectory(np.asarray(stamps), array[:, :3], array[:, 3:])
-
-
-def _check_pose(values: list[float], where: str) -> None:
-    if not all(map(math.isfinite, values)):
-        raise SequenceError(f'{where}: the pose holds NaN or infinity; leave out what was not '
-                            'measured')
-    norm = math.hypot(*values[3:])
-    if abs(norm - 1) > _NORM_TOLERANCE:
-        raise SequenceError(f'{where}: quaternion of norm {norm:.4g}: expected 1, in the order '
-                            'qx qy qz qw')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +21,10 @@ from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.ground_truth.labels import label_frames
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
-from adversarial_lcd_ros.training.gnn import train_gnn
+from adversarial_lcd_ros.lcd.scoring import Scoring, prepared
+from adversarial_lcd_ros.training.networks import make_trainer
 from adversarial_lcd_ros.training.pair_scores import (
     LabelledPairs,
     fit_decision,
@@ -99,14 +100,14 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
         Name of the target.
     sequences : sequence of TrainingSequence
     lcd : LcdConfig
-        Its map window.
+        Its map window, and its defences: the decision is fitted behind them.
     labels : LabelConfig
         What counts as a loop.
     pairs : int
         Most loops and random other pairs of a sequence.
     seed : int
     network : Path
-        Where the network of a target that has one is written (gnn, which takes PyTorch).
+        Where the network of a target that has one is written.
     progress : callable, optional
         Called with pairs done and to do.
 
@@ -120,10 +121,14 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
                        'others': int((~chosen.is_loop).sum())}
                       for sequence, chosen in zip(sequences, drawn, strict=True)],
         'map_window': lcd.map_window, 'labels': asdict(labels), 'seed': seed}
-    if target == GnnTarget.name:
-        card['network'] = train_gnn(drawn, network, seed, progress)
-        return fit_decision(target, drawn, lcd.map_window, progress, card, network)
-    return fit_decision(target, drawn, lcd.map_window, progress, card)
+    lcd = replace(lcd, target=target)
+    trainer = make_trainer(target)
+    if trainer:
+        defences = make_defences(lcd)
+        seen = [replace(pairs, graphs=[prepared(graph, defences) for graph in pairs.graphs])
+                for pairs in drawn]
+        card['network'] = trainer.train(seen, network, seed, progress)
+    return fit_decision(Scoring.of(lcd, network), drawn, lcd.map_window, progress, card)
 
 
 def collect_surrogate_data(graphs: Sequence[MultiTierGraph], lcd: LcdConfig, attack: AttackConfig,

@@ -17,6 +17,7 @@ from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.targets.gnn import INPUTS, OUTPUT, network_inputs
 from adversarial_lcd_ros.lcd.views import View, match_nodes
+from adversarial_lcd_ros.training.networks import Trainer
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs
 
 if TYPE_CHECKING:
@@ -41,30 +42,35 @@ def require_pytorch() -> None:
                          '"adversarial_lcd_ros[gnn]", or leave it out of --targets') from error
 
 
-def train_gnn(sequences: Sequence[LabelledPairs], path: Path, seed: int,
+class GnnTrainer(Trainer):
+    """Trains with PyTorch; ModelError without it."""
+
+    def __init__(self) -> None:
+        require_pytorch()
+
+    def train(self, sequences: Sequence[LabelledPairs], path: Path, seed: int,
               progress: Progress | None = None) -> dict[str, Any]:
-    """
-    Train the network on labelled pairs, write it as ONNX, and return what its card says.
+        """
+        Train the network on labelled pairs, write it as ONNX, and return what its card says.
 
-    An epoch is 2 steps of 48 pairs from each sequence, half of them loops.
+        An epoch is 2 steps of 48 pairs from each sequence, half of them loops.
 
-    Parameters
-    ----------
-    sequences : sequence of LabelledPairs
-    path : Path
-        ONNX file to write.
-    seed : int
-        Of weights and draws: same pairs, same seed, same bytes on one machine.
-    progress : callable, optional
-        Called with epochs done and to do.
+        Parameters
+        ----------
+        sequences : sequence of LabelledPairs
+        path : Path
+            ONNX file to write.
+        seed : int
+            Of weights and draws: same pairs, same seed, same bytes on one machine.
+        progress : callable, optional
+            Called with epochs done and to do.
 
-    Raises
-    ------
-    ModelError
-        PyTorch or onnx is not installed.
+        """
+        return _train(sequences, path, seed, progress)
 
-    """
-    require_pytorch()
+
+def _train(sequences: Sequence[LabelledPairs], path: Path, seed: int, progress: Progress | None
+           ) -> dict[str, Any]:
     import torch
 
     torch.manual_seed(seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,8 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision
-from adversarial_lcd_ros.lcd.targets import Target, make_target
-from adversarial_lcd_ros.lcd.views import Comparison, View
+from adversarial_lcd_ros.lcd.scoring import Scoring
+from adversarial_lcd_ros.lcd.views import View
 
 
 @dataclass(frozen=True)
@@ -49,9 +48,10 @@ class PairScorer:
     The window is that of the detector: the reference's neighbours in order of time.
     """
 
-    def __init__(self, target: Target, graphs: Sequence[MultiTierGraph], map_window: int) -> None:
-        self._target = target
-        self._views = [View(graph) for graph in graphs]
+    def __init__(self, scoring: Scoring, graphs: Sequence[MultiTierGraph],
+                 map_window: int) -> None:
+        self._scoring = scoring
+        self._views = [scoring.view(graph) for graph in graphs]
         self._window = map_window
 
     def references(self, reference: int) -> range:
@@ -62,8 +62,7 @@ class PairScorer:
     def scores(self, query: View, reference: int) -> NDArray[np.float64]:
         """Return the mean scores of a query with a reference's window, shape (channels,)."""
         views = [self._views[frame] for frame in self.references(reference)]
-        mean: NDArray[np.float64] = self._target.compare(
-            query, Comparison(query, views)).mean(axis=0)
+        mean: NDArray[np.float64] = self._scoring.compare(query, views).scores(query).mean(axis=0)
         return mean
 
     def pairs(self, pairs: LabelledPairs, progress: Progress | None = None
@@ -74,7 +73,7 @@ class PairScorer:
             rows.append(self.scores(self._views[query], int(reference)))
             if progress:
                 progress(done + 1, len(pairs.query))
-        return np.array(rows).reshape(len(rows), len(self._target.channels))
+        return np.array(rows).reshape(len(rows), len(self._scoring.target.channels))
 
 
 def retrieved_pairs(graphs: Sequence[MultiTierGraph], relation: NDArray[np.int8],
@@ -106,15 +105,14 @@ def retrieved_pairs(graphs: Sequence[MultiTierGraph], relation: NDArray[np.int8]
     return np.array(found, np.int64).reshape(-1, 2)
 
 
-def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_window: int,
-                 progress: Progress | None = None, card: dict[str, object] | None = None,
-                 network: Path | None = None) -> Decision:
+def fit_decision(scoring: Scoring, sequences: Sequence[LabelledPairs], map_window: int,
+                 progress: Progress | None = None, card: dict[str, object] | None = None
+                 ) -> Decision:
     """
     Return a logistic decision on the square roots of the target's scores.
 
     Loops and others weigh the same, whatever their numbers, and so do sequences. The card gets
-    the balanced accuracy on the training pairs of each sequence. A target with a network takes
-    the given one.
+    the balanced accuracy on the training pairs of each sequence.
 
     Raises
     ------
@@ -122,10 +120,10 @@ def fit_decision(target_name: str, sequences: Sequence[LabelledPairs], map_windo
         There are no loops, or nothing but loops.
 
     """
-    target = make_target(target_name, network)
+    target = scoring.target
     rows, labels, weights = [], [], []
     for pairs in sequences:
-        rows.append(PairScorer(target, pairs.graphs, map_window).pairs(pairs, progress))
+        rows.append(PairScorer(scoring, pairs.graphs, map_window).pairs(pairs, progress))
         labels.append(pairs.is_loop)
         loops = pairs.is_loop.mean() if len(pairs.is_loop) else 0.0
         if not 0 < loops < 1:

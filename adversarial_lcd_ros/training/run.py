@@ -16,20 +16,19 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
-from adversarial_lcd_ros.config import TARGETS, AttackConfig, BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.decision import Decision
-from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
+from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.training.decisions import (
     TrainingSequence,
     collect_surrogate_data,
     train_decision,
 )
-from adversarial_lcd_ros.training.gnn import require_pytorch
 from adversarial_lcd_ros.training.model_folder import (
     MODEL_CARD,
     decision_file,
@@ -37,6 +36,7 @@ from adversarial_lcd_ros.training.model_folder import (
     model_folder,
     network_file,
 )
+from adversarial_lcd_ros.training.networks import make_trainer
 from adversarial_lcd_ros.training.sources import (
     TrainingFrames,
     one_licence_each,
@@ -50,10 +50,15 @@ FORMAT = 'adversarial_lcd_ros/model_card/1'
 # Wider than what an evaluation counts as a loop: the decision also learns from glancing ones,
 # and from revisits within a few seconds, which short sequences are full of.
 TRAINING_LABELS = LabelConfig(min_gap_s=3.0, positive_overlap=0.45)
-# Trained unless others are asked for: those that need nothing but this package.
-DEFAULT_TARGETS = tuple(name for name in TARGETS if name != GnnTarget.name)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
+
+
+
+def default_targets() -> tuple[str, ...]:
+    """Return what is trained unless others are asked for: all that need only this package."""
+    return tuple(name for name in TARGETS if not TARGETS.find(name).trainer)
+
 
 Stage = Callable[[str], AbstractContextManager[Progress]]
 
@@ -93,7 +98,7 @@ class TrainingPlan:
     builder: BuilderConfig = field(default_factory=BuilderConfig)
     lcd: LcdConfig = field(default_factory=LcdConfig)
     labels: LabelConfig = TRAINING_LABELS
-    targets: tuple[str, ...] = DEFAULT_TARGETS
+    targets: tuple[str, ...] = field(default_factory=default_targets)
     pairs: int = 600
     vocabulary_stride: int = 2
     branching: int = 16
@@ -102,10 +107,11 @@ class TrainingPlan:
 
     def __post_init__(self) -> None:
         """Check names and ranges."""
-        unknown = sorted(set(self.targets) - set(TARGETS))
-        if unknown or not self.targets or len(set(self.targets)) != len(self.targets):
+        for target in self.targets:
+            TARGETS.check(target)
+        if not self.targets or len(set(self.targets)) != len(self.targets):
             raise ConfigError(f'targets {", ".join(self.targets) or "(none)"}: expected some of '
-                              f'{", ".join(TARGETS)}, each once')
+                              f'{TARGETS}, each once')
         for name, low in (('pairs', 1), ('vocabulary_stride', 1), ('branching', 2), ('depth', 1),
                           ('flips_per_frame', 0)):
             if getattr(self, name) < low:
@@ -184,8 +190,8 @@ def _open_all(sources: Sequence[SequencePart], licences: Sequence[str],
     """Open and check everything before the first minute of work."""
     if not sources:
         raise EvaluationError('no sequence to train on: expected at least one')
-    if GnnTarget.name in plan.targets:
-        require_pytorch()
+    for target in plan.targets:
+        make_trainer(target)
     opened = [open_source(source, licence) for source, licence in
               zip(sources, one_licence_each(sources, licences), strict=True)]
     for source in opened:
@@ -234,11 +240,12 @@ def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, 
                      work: Path, stage: Stage) -> dict[str, Any]:
     card = {}
     for target in plan.targets:
+        name = TARGETS.find(target).name
         with stage(f'decision of {target}') as progress:
             decision = train_decision(target, sequences, lcd=plan.lcd, labels=plan.labels,
                                       pairs=plan.pairs, seed=seed, progress=progress,
-                                      network=work / network_file(target))
-        decision.save(work / decision_file(target))
+                                      network=work / network_file(name))
+        decision.save(work / decision_file(name))
         card[target] = _decision_card(decision)
     return card
 
@@ -259,7 +266,7 @@ def _write_surrogate_data(sequence: TrainingSequence, plan: TrainingPlan, seed: 
     if not plan.flips_per_frame:
         return None
     target = plan.targets[0]
-    lcd = replace(plan.lcd, target=target, model=str(work / decision_file(target)))
+    lcd = replace(plan.lcd, target=target, model=str(work))
     attack = AttackConfig(perturbation=SURROGATE_PERTURBATION, seed=seed)
     with stage('surrogate data') as progress:
         data: SurrogateData = collect_surrogate_data(sequence.graphs, lcd, attack,

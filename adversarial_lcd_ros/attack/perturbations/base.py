@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.shown import Shown
 
 
 @dataclass
@@ -43,11 +44,10 @@ class Allowed:
         self.tried.update((pairs[:, 0] * graph.node_count + pairs[:, 1]).tolist())
 
 
-class Perturbation(Protocol):
-    """Proposes flips of a graph, the most promising first."""
+class Perturbation(Shown, ABC):
+    """Proposes flips of a graph, the most promising first; one of your own is a subclass."""
 
-    name: ClassVar[str]
-
+    @abstractmethod
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:
         """
@@ -55,4 +55,3 @@ class Perturbation(Protocol):
 
         An empty answer means that nothing is left to propose.
         """
-        ...

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
-from adversarial_lcd_ros.attack.perturbations.base import Allowed
+from adversarial_lcd_ros.attack.perturbations.base import Allowed, Perturbation
 from adversarial_lcd_ros.attack.perturbations.lanczos import leading
 from adversarial_lcd_ros.graph import MultiTierGraph
 
@@ -67,7 +67,7 @@ def eigencentrality(graph: MultiTierGraph, near: NDArray[np.float64] | None = No
     return found
 
 
-class Eigencentrality:
+class Eigencentrality(Perturbation):
     """
     The pairs with the largest x_u x_v, recomputed on the graph at hand.
 
@@ -75,6 +75,9 @@ class Eigencentrality:
     """
 
     name: ClassVar[str] = 'eigencentrality'
+    rank: ClassVar[int] = 7
+    colour: ClassVar[str] = '#2f5d8a'
+    marker: ClassVar[str] = 's'
 
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:

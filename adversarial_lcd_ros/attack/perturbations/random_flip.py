@@ -7,13 +7,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.perturbations.base import Allowed
+from adversarial_lcd_ros.attack.perturbations.base import Allowed, Perturbation
 from adversarial_lcd_ros.graph import MultiTierGraph
 
 ROUNDS = 8
 
 
-class RandomFlip:
+class RandomFlip(Perturbation):
     """
     Every pair is as likely as any other; with ``delete``, every edge.
 
@@ -21,6 +21,9 @@ class RandomFlip:
     """
 
     name: ClassVar[str] = 'random_flip'
+    rank: ClassVar[int] = 4
+    colour: ClassVar[str] = '#7a4a9c'
+    marker: ClassVar[str] = 'v'
 
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:

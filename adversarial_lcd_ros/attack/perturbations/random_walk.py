@@ -7,14 +7,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.perturbations.base import Allowed
+from adversarial_lcd_ros.attack.perturbations.base import Allowed, Perturbation
 from adversarial_lcd_ros.graph import MultiTierGraph
 
 MAX_STEPS = 4
 ROUNDS = 8
 
 
-class RandomWalk:
+class RandomWalk(Perturbation):
     """
     The first and the last node of a walk of 1 to 4 steps over the edges.
 
@@ -23,6 +23,9 @@ class RandomWalk:
     """
 
     name: ClassVar[str] = 'random_walk'
+    rank: ClassVar[int] = 5
+    colour: ClassVar[str] = '#d08700'
+    marker: ClassVar[str] = '^'
 
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:

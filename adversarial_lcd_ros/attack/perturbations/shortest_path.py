@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import breadth_first_order
 
-from adversarial_lcd_ros.attack.perturbations.base import Allowed
+from adversarial_lcd_ros.attack.perturbations.base import Allowed, Perturbation
 from adversarial_lcd_ros.graph import MultiTierGraph
 
 SOURCES = 16
 
 
-class ShortestPath:
+class ShortestPath(Perturbation):
     """
     For two random nodes: cut an edge of the shortest path, or join its ends.
 
@@ -23,6 +23,9 @@ class ShortestPath:
     """
 
     name: ClassVar[str] = 'shortest_path'
+    rank: ClassVar[int] = 6
+    colour: ClassVar[str] = '#2e8064'
+    marker: ClassVar[str] = 'D'
 
     def propose(self, graph: MultiTierGraph, count: int, allowed: Allowed,
                 rng: np.random.Generator) -> NDArray[np.int64]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.memory import Echo, Memory
-from adversarial_lcd_ros.attack.search import Hunt
+from adversarial_lcd_ros.attack.search import Hunt, Search
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 
@@ -39,7 +40,7 @@ class _Plan:
     shared: float
 
 
-class Recall:
+class Recall(Search):
     """
     A man in the middle has seen the map: every keyframe passed him.
 
@@ -51,7 +52,15 @@ class Recall:
     in reserve, is weighed by one query.
     """
 
+    name: ClassVar[str] = 'recall'
+    rank: ClassVar[int] = 100
+    colour: ClassVar[str] = '#c0392b'
+    own_settings: ClassVar[tuple[str, ...]] = ('echoes',)
+    # Flips are grouped, many to a query.
+    query_share: ClassVar[float] = 0.15
+
     def __init__(self, config: AttackConfig) -> None:
+        super().__init__(config)
         self._edits = config.edits
         self._families = FAMILIES if config.echoes == 'both' else (config.echoes,)
         self._memory = Memory()

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
-from adversarial_lcd_ros.attack.search import Hunt
-from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
+from adversarial_lcd_ros.attack.search import Hunt, Search
+from adversarial_lcd_ros.attack.surrogate_data import SurrogateData, data_path
 from adversarial_lcd_ros.attack.surrogates import Kernel, Surrogate, make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.registry import NONE
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import flip_features, node_features
 
 POOL_FACTOR = 3
@@ -54,7 +55,7 @@ class _Learner:
         return [waiting[place] for place in order]
 
 
-class Stepwise:
+class Stepwise(Search):
     """
     A perturbation proposes flips, a surrogate ranks them, the detector judges the first of them.
 
@@ -65,8 +66,16 @@ class Stepwise:
     chosen by whether the graph's words were seen before.
     """
 
-    def __init__(self, config: AttackConfig, data: Callable[[], SurrogateData]) -> None:
+    name: ClassVar[str] = 'stepwise'
+    own_settings: ClassVar[tuple[str, ...]] = (
+        'perturbation', 'surrogate', 'gamma', 'sigma', 'surrogate_data', 'wl_iterations',
+        'wl_features')
+
+    def __init__(self, config: AttackConfig) -> None:
+        super().__init__(config)
         self._config = config
+        if config.mode == 'surrogate' and config.surrogate == NONE:
+            raise ConfigError('mode "surrogate" needs a surrogate: found surrogate "none"')
         self._perturbation = make_perturbation(config.perturbation)
         self._memory = Memory()
         self._trained: dict[bool, Surrogate] = {}
@@ -74,7 +83,7 @@ class Stepwise:
             if config.wl_features == 'per_graph':
                 raise ConfigError('wl_features "per_graph" belong to one frame\'s nodes: mode '
                                   '"surrogate" needs "pooled"')
-            loaded = data()
+            loaded = SurrogateData.load(data_path(config))
             self._bound = loaded.loop_bound()
             self._trained = loaded.fit(self._surrogate)
 

@@ -22,6 +22,7 @@ class RelevanceDetermination(Regressor):
     """
 
     name: ClassVar[str] = 'ard'
+    title: ClassVar[str] = 'Bayesian ARD'
 
     def _make(self, scaled: NDArray[np.float64]) -> ARDRegression:
         return ARDRegression(max_iter=ITERATIONS)

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.surrogates.kernel import Kernel
+from adversarial_lcd_ros.shown import Shown
 
-class Surrogate(Protocol):
-    """Predicts which of several perturbed graphs has the largest attack loss."""
 
-    name: ClassVar[str]
+class Surrogate(Shown, ABC):
+    """
+    Predicts which of several perturbed graphs has the largest attack loss.
 
+    One of your own is a subclass. Those with a kernel take its width from the one given.
+    """
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+
+    @abstractmethod
     def fit(self, features: NDArray[np.float64], gain: NDArray[np.float64]) -> bool:
         """
         Learn from queried graphs.
@@ -30,8 +39,7 @@ class Surrogate(Protocol):
             False where the data do not suffice to learn from.
 
         """
-        ...
 
+    @abstractmethod
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a score for each row of (k, d) features, larger for a larger loss, (k,)."""
-        ...

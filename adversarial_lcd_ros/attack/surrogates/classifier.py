@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
 
-from adversarial_lcd_ros.attack.surrogates.kernel import Kernel
+from adversarial_lcd_ros.attack.surrogates.base import Surrogate
 from adversarial_lcd_ros.attack.surrogates.scaling import standardise
 
 MIN_ROWS = 10
 
 
-class Classifier(ABC):
+class Classifier(Surrogate):
     """
     Classifies whether a flip raises the attack loss; how surely it does ranks the flips.
 
@@ -23,9 +23,6 @@ class Classifier(ABC):
     effect count as no gain. Features are standardised on the rows of each fit, classes weigh the
     same.
     """
-
-    def __init__(self, kernel: Kernel) -> None:
-        self._kernel = kernel
 
     def fit(self, features: NDArray[np.float64], gain: NDArray[np.float64]) -> bool:
         """Learn; needs ten rows and both signs."""

@@ -20,6 +20,9 @@ class NaiveBayes(Classifier):
     """
 
     name: ClassVar[str] = 'naive_bayes'
+    title: ClassVar[str] = 'naive Bayes'
+    rank: ClassVar[int] = 2
+    dash: ClassVar[str] = '--'
 
     def _make(self, scaled: NDArray[np.float64]) -> GaussianNB:
         return GaussianNB(priors=[0.5, 0.5])

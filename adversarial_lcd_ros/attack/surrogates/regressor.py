@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.preprocessing import StandardScaler
 
-from adversarial_lcd_ros.attack.surrogates.kernel import Kernel
+from adversarial_lcd_ros.attack.surrogates.base import Surrogate
 from adversarial_lcd_ros.attack.surrogates.scaling import standardise
 
 MIN_ROWS = 10
 
 
-class Regressor(ABC):
+class Regressor(Surrogate):
     """
     Predicts the gain in attack loss.
 
     Features and gains are standardised on the rows of each fit: a flip gains a thousandth of a
     logit where one counts, and penalties and insensitive bands are made for a spread of one.
     """
-
-    def __init__(self, kernel: Kernel) -> None:
-        self._kernel = kernel
 
     def fit(self, features: NDArray[np.float64], gain: NDArray[np.float64]) -> bool:
         """Learn; needs ten rows whose gains are not all the same."""

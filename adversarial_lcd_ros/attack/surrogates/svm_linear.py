@@ -15,6 +15,9 @@ class SvmLinear(Classifier):
     """The distance from the boundary ranks; C = 1. A linear kernel has no gamma."""
 
     name: ClassVar[str] = 'svm_linear'
+    title: ClassVar[str] = 'SVM-linear'
+    rank: ClassVar[int] = 0
+    dash: ClassVar[str] = ':'
 
     def _make(self, scaled: NDArray[np.float64]) -> SVC:
         return SVC(kernel='linear', class_weight='balanced')

@@ -21,6 +21,9 @@ class SvmPoly(Classifier):
     """
 
     name: ClassVar[str] = 'svm_poly'
+    title: ClassVar[str] = 'SVM-polynomial'
+    rank: ClassVar[int] = 1
+    dash: ClassVar[str] = '-.'
 
     def _make(self, scaled: NDArray[np.float64]) -> SVC:
         return SVC(kernel='poly', degree=DEGREE, coef0=1.0, gamma=self._kernel.gamma(scaled),

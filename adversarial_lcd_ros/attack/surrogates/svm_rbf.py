@@ -17,6 +17,8 @@ class SvmRbf(Classifier):
     """The distance from the boundary ranks; C = 1."""
 
     name: ClassVar[str] = 'svm_rbf'
+    title: ClassVar[str] = 'SVM-RBF'
+    rank: ClassVar[int] = 3
 
     def _make(self, scaled: NDArray[np.float64]) -> SVC:
         self._gamma = self._kernel.gamma(scaled)

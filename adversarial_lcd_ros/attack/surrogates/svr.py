@@ -15,6 +15,7 @@ class SupportVectorRegression(Regressor):
     """Predicts the gain; C = 1, a band of a tenth of a standard deviation."""
 
     name: ClassVar[str] = 'svr'
+    title: ClassVar[str] = 'SVR'
 
     def _make(self, scaled: NDArray[np.float64]) -> SVR:
         return SVR(kernel='rbf', gamma=self._kernel.gamma(scaled))

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from adversarial_lcd_ros.config import TARGETS, BuilderConfig, Config, LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, Config, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.recipes import load_yaml
+from adversarial_lcd_ros.registry import TARGETS
 
 ConfigT = TypeVar('ConfigT', bound=Config)
 _KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels')
@@ -98,10 +99,11 @@ def _sequence(source: str, entry: Mapping[str, Any], choices: Choices) -> Target
     builder = _merged(BuilderConfig, entry.get('builder'), choices.builder)
     nodes = choices.nodes or tuple(entry.get('nodes') or (builder.features,))
     targets = choices.targets or tuple(entry.get('targets') or TARGETS)
-    unknown = sorted(set(targets) - set(TARGETS))
-    if unknown:
-        raise ConfigError(f'{source}: no target {", ".join(unknown)}; there are: '
-                          f'{", ".join(TARGETS)}')
+    for target in targets:
+        try:
+            TARGETS.check(target)
+        except ConfigError as error:
+            raise ConfigError(f'{source}: {error}') from error
     return TargetSequence(source, builder, _merged(LcdConfig, entry.get('lcd'), choices.lcd),
                           _merged(LabelConfig, entry.get('labels'), choices.labels), nodes,
                           targets, _part(source, entry.get('scored', (0, 1))))

@@ -7,7 +7,9 @@ frame of a replay is judged against the keyframes before it, retrieval by words 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 import json
 from pathlib import Path
 
@@ -28,11 +30,11 @@ from adversarial_lcd_ros.evaluation.metrics import (
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
-from adversarial_lcd_ros.lcd.decision import Decision
-from adversarial_lcd_ros.lcd.targets import Target, make_target
-from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.lcd.scoring import Judge
+from adversarial_lcd_ros.lcd.targets import decision_path
 from adversarial_lcd_ros.training.model_folder import trained_on
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
@@ -96,16 +98,11 @@ class TargetTask:
     @property
     def model(self) -> Path:
         """File of the trained decision."""
-        return target_path(self.lcd.model, self.target)
+        return decision_path(self.lcd.model, self.target)
 
-    def decision(self) -> Decision:
-        """Return the trained decision of the target."""
-        target = self.make_target()
-        return Decision.load(self.model, target.name, target.channels)
-
-    def make_target(self) -> Target:
-        """Return the target; one with a network takes that beside its decision."""
-        return make_target(self.target, self.model.with_suffix('.onnx'))
+    def judge(self) -> Judge:
+        """Return what judges as the detector does: target, decision, threshold and defences."""
+        return Judge(replace(self.lcd, target=self.target))
 
     def labels(self) -> FrameLabels:
         """Return the labels, without queries outside the part that is scored."""
@@ -124,10 +121,10 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     Return the key of a task and its row.
 
     The row has ``sequence, target, protocol, nodes, nodes_mean, frames, scored, trained_on,
-    references_trained_on, geometric_check, labels, positives, negatives, balanced_accuracy,
-    ci95, average_precision, recall_at_100_precision, mcc, precision, recall``, and ``n_pairs,
-    distinct_pairs, seeds`` or ``n_frames, wrong_matches, latency_to_first_closure_s``; labels
-    are settings. Pairs are judged without the geometric check. Undefined figures are None, so
+    references_trained_on, geometric_check, defences, labels, positives, negatives,
+    balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc, precision,
+    recall``, and ``n_pairs, distinct_pairs, seeds`` or ``n_frames, wrong_matches,
+    latency_to_first_closure_s``; labels are settings. Undefined figures are None, so
     all of a sequence without pairs of a class.
     """
     figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
@@ -139,30 +136,39 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
         'trained_on': trained_on(task.model, stream.graphs.source, task.scored),
         'references_trained_on': trained_on(task.model, stream.graphs.source,
                                             (0.0, task.scored[1])),
-        'geometric_check': task.protocol == 'live' and task.lcd.geometric_check,
+        'geometric_check': task.lcd.geometric_check, 'defences': task.lcd.defences,
         'labels': asdict(task.label_config), **figures}
 
 
 def _pairs(task: TargetTask) -> Row:
-    labels, decision = task.labels(), task.decision()
+    labels, judge = task.labels(), task.judge()
     graphs = load_stream_graphs(task.stream.graphs)
     count = min(task.pairs, *(int((labels.relation == value).sum())
                               for value in (POSITIVE, NEGATIVE)))
     if not count:
         return {**_figures(None), 'n_pairs': 0, 'distinct_pairs': 0, 'seeds': 0, 'ci95': None}
-    scorer = PairScorer(task.make_target(), graphs, task.lcd.map_window)
+    scorer = PairScorer(judge.scoring, graphs, task.lcd.map_window)
     draws = [sample_pairs(labels.relation, np.random.default_rng(seed), count)
              for seed in task.seeds]
     query, reference, is_loop = (np.concatenate([getattr(draw, name) for draw in draws])
                                  for name in ('query', 'reference', 'is_loop'))
-    logit = decision.logit(scorer.pairs(LabelledPairs(graphs, query, reference, is_loop)))
+    logit = judge.decision.logit(scorer.pairs(LabelledPairs(graphs, query, reference, is_loop)))
     kind = np.where(is_loop, POSITIVE, NEGATIVE).astype(np.int8)
-    probability = 1 / (1 + np.exp(-logit))
-    declared = probability >= task.lcd.threshold
+    declared, probability = _verdicts(judge, logit, [
+        (graphs[one], graphs[other]) for one, other in zip(query, reference, strict=True)])
     metrics = measure(kind, declared, probability, np.ones(len(kind), bool))
     return {**_figures(metrics), 'n_pairs': len(kind), 'seeds': len(task.seeds),
             'distinct_pairs': np.unique([query, reference], axis=1).shape[1],
             'ci95': _pair_interval(labels, query, kind, declared == is_loop)}
+
+
+def _verdicts(judge: Judge, logit: NDArray[np.float64],
+              pairs: Sequence[tuple[MultiTierGraph, MultiTierGraph]]
+              ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    verdicts = [judge.verdict(float(value), partial(judge.scoring.support, *pair))
+                for value, pair in zip(logit, pairs, strict=True)]
+    return (np.array([is_loop for is_loop, _ in verdicts], bool),
+            np.array([chance for _, chance in verdicts]))
 
 
 def _pair_interval(labels: FrameLabels, query: NDArray[np.int64], kind: NDArray[np.int8],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation.store import Row
+from adversarial_lcd_ros.registry import NONE, TARGETS
 
 TABLES = 'target.md'
 _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average precision',
@@ -20,6 +20,7 @@ def target_tables(rows: Iterable[Row]) -> str:
     """Return a table for each protocol, in the order of sequences, sizes and targets."""
     rows = list(rows)
     order = {name: place for place, name in enumerate(TARGETS)}
+    own = len(order)
     parts = []
     for protocol, head in _HEADS.items():
         chosen = [row for row in rows if row['protocol'] == protocol]
@@ -27,7 +28,7 @@ def target_tables(rows: Iterable[Row]) -> str:
             continue
         names = list(dict.fromkeys(row['sequence'] for row in chosen))
         chosen.sort(key=lambda row: (names.index(row['sequence']), row['nodes'],
-                                     order[row['target']]))
+                                     order.get(row['target'], own), row['target']))
         lines = [_line(('sequence', 'n', 'target', *head)), _line(['---'] * (len(head) + 3))]
         for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'])):
             lines += _group_lines(list(group))
@@ -43,6 +44,8 @@ def _group_lines(group: Sequence[Row]) -> list[str]:
             name += f', scored from {row["scored"][0]:g} to {row["scored"][1]:g}'
         if row['geometric_check']:
             name += ', geometric check'
+        if row.get('defences', NONE) != NONE:
+            name += f', {row["defences"]}'
         if row['trained_on']:
             name += ' (seen in training)'
         elif row['references_trained_on']:

@@ -216,7 +216,7 @@ def _contest(cell: Cell, lcd: LcdConfig, seed: int,
                       detectors)
     attack = replace(cell.attack, seed=seed)
     adversary: _Adversary = (_Yardstick(Optimum(judging, attack))
-                             if cell.perturbation == Optimum.name else Attacker(attack))
+                             if cell.search == Optimum.name else Attacker(attack))
     return _Contest(adversary, asked, judging)
 
 

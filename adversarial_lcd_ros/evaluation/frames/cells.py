@@ -12,10 +12,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.config import AttackConfig, LcdConfig
+from adversarial_lcd_ros.attack.surrogate_data import data_path
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig, names_in
 from adversarial_lcd_ros.environment import code_digest, named_code_digest
 from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
-from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path, target_path
+from adversarial_lcd_ros.evaluation.methods import COLUMNS, attack_columns, method_of
+from adversarial_lcd_ros.lcd.targets import decision_path
+from adversarial_lcd_ros.registry import YARDSTICKS
 
 # Of the row's columns; a change in the code below runs cells again by itself.
 SCHEMA = 4
@@ -25,7 +28,7 @@ _CODE = ('attack', 'lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled',
          'evaluation/frames/rows')
 ORACLES = ('soft', 'hard')
 # Attack settings that have columns of their own.
-_COLUMNS = ('mode', 'perturbation', 'surrogate', 'ratio', 'edits', 'queries_per_edit', 'seed')
+_COLUMNS = ('mode', *COLUMNS, 'ratio', 'edits', 'queries_per_edit', 'seed')
 # Files count by their content.
 _FILES = ('surrogate_data',)
 
@@ -37,10 +40,10 @@ class Cell:
 
     Attributes
     ----------
-    perturbation : str
-        That of ``attack``, or 'optimum', the yardstick.
+    search : str
+        That of ``attack``, or a yardstick in its place.
     attack : AttackConfig
-        Its seed does not count.
+        Its seed does not count, nor do settings that the search does not use.
     target : str
         The detector that judges.
     asked_target : str
@@ -60,7 +63,7 @@ class Cell:
 
     """
 
-    perturbation: str
+    search: str
     attack: AttackConfig
     target: str
     asked_target: str
@@ -70,6 +73,17 @@ class Cell:
     seeds: int
     name: str = ''
     threshold: float = LcdConfig.threshold
+
+    @property
+    def method(self) -> str:
+        """What chooses the flips: a perturbation, or else a search."""
+        return method_of(self._columns)
+
+    @property
+    def _columns(self) -> dict[str, str]:
+        if self.search in YARDSTICKS:
+            return {**dict.fromkeys(COLUMNS, ''), 'search': self.search}
+        return attack_columns(self.attack)
 
     @property
     def variant(self) -> str:
@@ -82,8 +96,7 @@ class Cell:
     @property
     def settings(self) -> dict[str, Any]:
         """What tells this cell from others, apart from its sample; the columns of a row."""
-        return {'target': self.target, 'asked_target': self.asked_target,
-                'perturbation': self.perturbation, 'surrogate': self.attack.surrogate,
+        return {'target': self.target, 'asked_target': self.asked_target, **self._columns,
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
                 'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant}
@@ -111,23 +124,22 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
               'detector': detector, 'attack': attack,
               **{name: value for name, value in cell.settings.items() if name not in detector},
-              'code': [code_digest(*_CODE), *_own_code(cell)],
+              'code': [code_digest(*_CODE), *_own_code(cell, lcd)],
               'files': [file_digest(path) for path in _files(cell, lcd)]}
     return digest_of(json.dumps(values, sort_keys=True).encode())
 
 
-def _own_code(cell: Cell) -> list[str]:
+def _own_code(cell: Cell, lcd: LcdConfig) -> list[str]:
     """Return digests of the classes of the user's own, which are named as package.module:Class."""
     attack = [value for name, value in asdict(cell.attack).items() if name not in _FILES]
-    named = [cell.target, cell.asked_target, cell.perturbation, *attack]
+    named = [cell.target, cell.asked_target, cell.search, *names_in(lcd.defences), *attack]
     return [named_code_digest(name) for name in dict.fromkeys(named)
             if isinstance(name, str) and ':' in name]
 
 
 def _files(cell: Cell, lcd: LcdConfig) -> list[Path]:
-    files = [target_path(lcd.model, target)
+    files = [decision_path(lcd.model, target)
              for target in dict.fromkeys((cell.target, cell.asked_target))]
-    if cell.attack.mode == 'surrogate':
-        chosen = cell.attack.surrogate_data
-        files.append(Path(chosen) if chosen else model_path(SURROGATE_DATA))
+    if cell.attack.mode == 'surrogate' and cell.settings['surrogate']:
+        files.append(data_path(cell.attack))
     return files

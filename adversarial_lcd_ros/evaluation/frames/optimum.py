@@ -21,9 +21,10 @@ from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer
+from adversarial_lcd_ros.shown import Shown
 
 
-class Optimum:
+class Optimum(Shown):
     """
     At each step the one flip that moves the log odds most towards the opposite decision.
 
@@ -37,6 +38,11 @@ class Optimum:
     """
 
     name: ClassVar[str] = 'optimum'
+    title: ClassVar[str] = 'optimum (yardstick)'
+    rank: ClassVar[int] = 200
+    colour: ClassVar[str] = '#33373d'
+    marker: ClassVar[str] = '*'
+    dash: ClassVar[str] = '--'
 
     def __init__(self, detector: LoopClosureDetector, config: AttackConfig | None = None) -> None:
         self.detector = detector
@@ -91,5 +97,5 @@ class Optimum:
 
     def _loss(self, graph: MultiTierGraph, is_loop: bool) -> float:
         """Return L of Eq. (1): log odds against the detector's answer to the clean graph."""
-        logit = float(self.detector.log_odds(graph).max())
+        logit = self.detector.verdict_log_odds(graph)
         return -logit if is_loop else logit

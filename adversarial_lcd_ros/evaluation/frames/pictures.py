@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation.frames.attacked import (
     sample_frames,
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
-from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.metrics import EFFECTS
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.store import Row
@@ -77,7 +77,7 @@ def _strongest(attacks: Mapping[str, Sequence[Row]]) -> str:
     """Return the attack that turned most frames over; '' if none turned any."""
     turned = {name: sum(row['suppressed'] + row['invented'] for row in rows)
               for name, rows in attacks.items()
-              if rows[0]['perturbation'] != Optimum.name
+              if not is_yardstick(rows[0])
               and rows[0]['asked_target'] == rows[0]['target']}
     best = max(turned, key=lambda name: turned[name], default='')
     return best if turned.get(best) else ''

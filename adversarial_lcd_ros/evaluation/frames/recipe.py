@@ -10,7 +10,7 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
         ratio: [1e-4, 3e-4]
 
 A setting with a list is an axis: this recipe has four attacks. Beside the settings of the
-attacker an attack has those of ``CellConfig``.
+attacker an attack has those of ``CellConfig``; its search may be a yardstick.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from adversarial_lcd_ros.config import (
-    TARGETS,
     AttackConfig,
     BuilderConfig,
     Config,
@@ -31,8 +30,9 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
-from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
 
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
@@ -48,7 +48,7 @@ class CellConfig(Config):
     target: str = setting('wl', 'The detector that is attacked.', choices=TARGETS)
     asked_target: str = setting(
         '', 'Transfer: the detector that answers queries; empty: the one attacked.',
-        choices=('', *TARGETS))
+        choices=TARGETS, empty=True)
     oracle: str = setting(
         'soft', 'soft: answers with probabilities; hard: decisions only.', choices=ORACLES)
     threshold: float = setting(
@@ -129,21 +129,20 @@ def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     own_names = {entry.name for entry in fields(CellConfig)}
     attack = {name: _number(value) if name in _FLOATS else value
               for name, value in values.items() if name not in own_names}
-    perturbation = attack.get('perturbation', AttackConfig.perturbation)
+    search = attack.get('search', AttackConfig.search)
     unused: tuple[str, ...] = ()
-    if perturbation == Optimum.name:
+    if search in YARDSTICKS:
         # It asks nobody and learns nothing: all else would tell equal cells apart.
-        attack = {'surrogate': 'none', **{name: attack[name] for name in ('ratio', 'edits')
-                                          if name in attack}}
+        attack = {name: attack[name] for name in ('ratio', 'edits') if name in attack}
         unused = ('oracle', 'asked_target')
     try:
         own = CellConfig.from_mapping({name: value for name, value in values.items()
                                        if name in own_names and name not in unused})
-        config = AttackConfig.from_mapping(attack)
+        config = used_settings(AttackConfig.from_mapping(attack))
     except ConfigError as error:
         raise ConfigError(f'recipe {path}: {error}') from error
     known = asdict(own)
-    return Cell(perturbation, config, **{**known, 'asked_target': own.asked_target or own.target})
+    return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target})
 
 
 def _number(value: Any) -> Any:

@@ -25,25 +25,21 @@ from adversarial_lcd_ros.evaluation.frames.attacked import (
     sample_frames,
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
-from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.evaluation.frames.rows import make_row
+from adversarial_lcd_ros.evaluation.methods import method_of
 from adversarial_lcd_ros.evaluation.store import CellStore, Row
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.evaluation.workers import Run
-from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.lcd.targets import decision_path
+from adversarial_lcd_ros.registry import SEARCHES, TARGETS, YARDSTICKS
 from adversarial_lcd_ros.training.model_folder import trained_on
 
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
-# What takes how long, seconds on one core (docs/evaluation.md), by the target that is asked: a
-# query of a graph of 300 nodes, with its share of the search, and a flip scored by the yardstick.
+# Seconds on one core (docs/evaluation.md): of a frame and of a walk; classes say the rest of them.
 # They only tell how long a sweep may take.
-_QUERY_S = {'anchored': 0.6e-3, 'objects': 2.5e-3, 'wl_exact': 1.3e-3, 'gnn': 3.5e-3, '': 0.4e-3}
-_SCORE_S = {'anchored': 8e-6, 'objects': 40e-6, 'wl_exact': 1.3e-3, 'gnn': 3.5e-3, '': 0.3e-6}
 _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
-# Recall groups flips, and does not spend its queries one by one.
-_RECALL_SHARE = 0.15
 
 
 
@@ -165,14 +161,14 @@ def _task(stream: Stream, sample: FrameSample, named: Sequence[tuple[str, Cell]]
 def _expected_s(cell: Cell, nodes: float) -> float:
     """Return about how long a frame takes on one core, if the attack spends its budget."""
     edits = edit_budget(round(nodes), cell.attack.ratio)
-    if cell.perturbation == Optimum.name:
-        return _FRAME_S + edits * nodes * nodes / 2 * _SCORE_S.get(cell.target, _SCORE_S[''])
+    if cell.search in YARDSTICKS:
+        flip_s: float = TARGETS[cell.target].flip_s
+        return _FRAME_S + edits * nodes * nodes / 2 * flip_s
     queries = min(edits * cell.attack.queries_per_edit, cell.attack.max_queries)
     asked = float(queries) if cell.attack.mode == 'query' else 0.0
-    if cell.perturbation == 'recall':
-        asked *= _RECALL_SHARE
-    query_s = _QUERY_S.get(cell.asked_target, _QUERY_S[''])
-    return _FRAME_S + asked * query_s * nodes / _NODES
+    share: float = SEARCHES[cell.search].query_share
+    query_s: float = TARGETS[cell.asked_target].query_s
+    return _FRAME_S + asked * share * query_s * nodes / _NODES
 
 
 def run_sweep(sweep: Sweep, store: CellStore, run: Run,
@@ -213,7 +209,7 @@ def run_task(task: Task) -> tuple[list[tuple[str, Row]], float]:
         graphs = load_stream_graphs(task.graphs)
         found = attack_frames(graphs, task.sample, task.cells, task.lcd, task.seed)
     rows = [(key, {**make_row(cell, task.seed, task.sequence, results),
-                   'trained_on': trained_on(target_path(task.lcd.model, cell.target),
+                   'trained_on': trained_on(decision_path(task.lcd.model, cell.target),
                                             task.graphs.source),
                    'versions': versions_digest()})
             for key, cell, results in zip(task.keys, task.cells, found, strict=True)]
@@ -232,16 +228,16 @@ def kinds_of_cells(rows: Sequence[Row]) -> list[tuple[str, int, list[float]]]:
     """
     Return where the time went: what, frames, and seconds a frame for queries, search, judging.
 
-    One entry for each perturbation and surrogate by mode, target asked and size of graph, the
-    most expensive first; frames that cannot be attacked do not count.
+    One entry for each search, or perturbation and surrogate, by mode, target asked and size of
+    graph, the most expensive first; frames that cannot be attacked do not count.
 
     """
     frames: Counter[str] = Counter()
     spent: dict[str, Counter[str]] = {name: Counter() for name in ('query_s', 'search_s',
                                                                    'judge_s')}
     for row in (row for row in rows if row['frames'] > row['unattackable']):
-        kind = (f'{row["perturbation"]}, {row["surrogate"]}, {row["mode"]}, '
-                f'{row["asked_target"]}, {row["nodes"]} features')
+        kind = ', '.join(filter(None, (method_of(row), row['surrogate'], row['mode'],
+                                       row['asked_target'], f'{row["nodes"]} features')))
         frames[kind] += row['frames'] - row['unattackable']
         for name, seconds in spent.items():
             seconds[kind] += row[name]

@@ -9,7 +9,6 @@ from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.kinds.base import (
     INTERVAL,
-    MEASURED,
     NUMBER,
     Columns,
     Figure,
@@ -24,8 +23,10 @@ from adversarial_lcd_ros.evaluation.results import SUMMARY
 
 _SEQUENCE: Columns = {'sequence': str, 'frames': int, 'positives': NUMBER, 'negatives': NUMBER,
                       'edges_mean': NUMBER, 'not_scored': dict}
+# Nobody knows the settings of an attack that was only recorded.
+_SETTING = (str, type(None))
 _ATTACK: Columns = {
-    'perturbation': str, 'surrogate': str, 'mode': str, 'ratio': MEASURED,
+    'perturbation': _SETTING, 'surrogate': _SETTING, 'mode': _SETTING, 'ratio': NUMBER,
     'decline_ci95': INTERVAL,
     **dict.fromkeys(('edits_mean', 'queries_mean', 'decline_pp', 'suppressed', 'invented',
                      'unattackable'), NUMBER)}
@@ -61,7 +62,8 @@ class ReplayResults(ResultsKind):
         summary = from_document(results.summary)
         return [FigureTable(f'The detector on {summary["sequence"]}',
                             wording.figure_rows(summary)),
-                FigureTable('Decline in balanced accuracy', wording.decline_rows(summary))]
+                FigureTable('Decline in balanced accuracy' if wording.is_labelled(summary)
+                            else 'Decisions changed', wording.decline_rows(summary))]
 
     def figures(self, results: Results) -> list[Figure]:
         """Return the figures of every run."""

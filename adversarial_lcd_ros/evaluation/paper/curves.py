@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_of
 from adversarial_lcd_ros.evaluation.paper.plots import Curve
 from adversarial_lcd_ros.evaluation.paper.summaries import (
-    OPTIMUM,
     USUAL,
     Cell,
     frame_right,
@@ -21,6 +20,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
 )
 from adversarial_lcd_ros.evaluation.paper.tables import SETTING
 from adversarial_lcd_ros.evaluation.store import Row
+from adversarial_lcd_ros.registry import TARGETS
 
 _POINTS = 120
 _SHARED = tuple(name for name in SETTING if name not in ('target', 'mode'))
@@ -71,11 +71,11 @@ def query_curves(rows: Iterable[Row], setting: Mapping[str, object], ratio: floa
     spent: dict[tuple[str, str, str], dict[str, list[NDArray[np.float64]]]] = defaultdict(
         lambda: defaultdict(list))
     for row in rows:
-        if (row['ratio'] == ratio and row['mode'] == 'query' and row['perturbation'] != OPTIMUM
+        if (row['ratio'] == ratio and row['mode'] == 'query' and not is_yardstick(row)
                 and (row.get('asked_target') or row['target']) == row['target']
                 and all(row.get(name, USUAL.get(name)) == value
                         for name, value in setting.items())):
-            method = (wording.method_title(row), str(row['perturbation']), row['surrogate'])
+            method = (wording.method_title(row), method_of(row), row['surrogate'])
             spent[method][row['sequence']].append(_queries_to_turn(row))
     largest = max((float(part[np.isfinite(part)].max(initial=0.0))
                    for of in spent.values() for parts in of.values() for part in parts),
@@ -151,7 +151,7 @@ def _comparable(cells: Sequence[Cell]) -> list[Cell]:
 
 
 def _attack(method: Cell) -> str:
-    if method['perturbation'] == OPTIMUM:
+    if is_yardstick(method):
         return 'optimum (yardstick)'
     return wording.attack_title({**method, 'name': None})
 
@@ -159,7 +159,7 @@ def _attack(method: Cell) -> str:
 def optimum_shares(cells: Sequence[Cell], setting: Cell,
                    ratio: float) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
     """
-    Return attack to sequence to share of the optimum's decline, and attack to perturbation.
+    Return attack to sequence to share of the optimum's decline, and attack to its method.
 
     On the target of a setting, with its size of graph and answers; key '' is the share of the
     mean declines. The largest share comes first, the optimum itself is left out.
@@ -168,17 +168,17 @@ def optimum_shares(cells: Sequence[Cell], setting: Cell,
     chosen = [cell for cell in cells if cell['ratio'] == ratio
               and cell['asked_target'] == cell['target'] and cell['mode'] != 'pass'
               and all(cell[name] == setting[name] for name in
-                      (('target', 'nodes', 'threshold') if cell['perturbation'] == OPTIMUM
+                      (('target', 'nodes', 'threshold') if is_yardstick(cell)
                        else ('target', *_SHARED)))]
-    perturbations: dict[str, str] = {}
+    methods_of: dict[str, str] = {}
     shares: dict[str, dict[str, float]] = {}
     for method in summarise_methods(chosen):
-        if method['share_of_optimum'] is not None and method['perturbation'] != OPTIMUM:
+        if method['share_of_optimum'] is not None and not is_yardstick(method):
             title = _attack(method)
-            perturbations[title] = method['perturbation']
+            methods_of[title] = method['method']
             shares[title] = {'': method['share_of_optimum']}
     for cell in chosen:
         if _attack(cell) in shares and cell['share_of_optimum'] is not None:
             shares[_attack(cell)][cell['sequence']] = cell['share_of_optimum']
     order = sorted(shares, key=lambda title: (-shares[title][''], title))
-    return {title: shares[title] for title in order}, perturbations
+    return {title: shares[title] for title in order}, methods_of

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
-    OPTIMUM,
     Cell,
     is_attackable,
 )
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
+from adversarial_lcd_ros.registry import TARGETS
 
 _NONE = '-'
 
@@ -53,7 +53,7 @@ def _target(target: str, cells: Sequence[Cell], methods: Sequence[Cell], usual: 
              _line(['before', '', '', '', *(wording.percent(before.get(name))
                                             for name in sequences), '', ''])]
     for method in sorted(methods, key=lambda method: (
-            method['perturbation'] == OPTIMUM, -method['decline_pp'])):
+            is_yardstick(method), -method['decline_pp'])):
         key = tuple(method[name] for name in ATTACK)
         entries = [at.get((*key, name)) for name in sequences]
         share = method['share_of_optimum']

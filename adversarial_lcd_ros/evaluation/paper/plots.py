@@ -11,36 +11,29 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.evaluation.methods import method_facts, surrogate_facts
 from adversarial_lcd_ros.evaluation.page import GRID, INK, NARROW, STYLE, svg
 from adversarial_lcd_ros.evaluation.paper.ranks import RankedMethod, Ranking
-from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
 
-_COLOURS = {'eigencentrality': '#2f5d8a', 'recall': '#c0392b', 'random_walk': '#d08700',
-            'shortest_path': '#2e8064', 'random_flip': '#7a4a9c', OPTIMUM: INK}
 _SPARE = ('#8c564b', '#5f6b73', '#b5739d', '#3a9ea5', '#9a8c2c')
-_MARKERS = {'eigencentrality': 's', 'recall': 'o', 'random_walk': '^', 'shortest_path': 'D',
-            'random_flip': 'v', OPTIMUM: '*'}
 _LINE, _SOFT = 1.6, '#9aa0a8'
-
-_DASHES = {'svm_linear': ':', 'svm_poly': '-.', 'naive_bayes': '--'}
 
 
 class Curve(NamedTuple):
     """Share of right decisions turned over (0 to 1) within so many queries (ascending)."""
 
     title: str
-    perturbation: str
+    method: str
     surrogate: str
     queries: NDArray[np.float64]
     share: NDArray[np.float64]
 
 
-def colour(perturbation: str) -> str:
-    """Return the colour of a perturbation, the same in every plot."""
-    if perturbation in _COLOURS:
-        return _COLOURS[perturbation]
-    return _SPARE[sum(perturbation.encode()) % len(_SPARE)]  # as given by the name: no memory
+def colour(method: str) -> str:
+    """Return the colour of a perturbation or a search, the same in every plot."""
+    spare = _SPARE[sum(method.encode()) % len(_SPARE)]  # as given by the name: no memory
+    return method_facts(method).colour or spare
 
 
 def budget_curves(table: DeclineTable, width: float) -> bytes:
@@ -70,8 +63,8 @@ def budget_curves(table: DeclineTable, width: float) -> bytes:
                                for name in ('decline_pp', 'least_pp', 'most_pp'))
             axes.vlines(at, low, high, color=colour(value), linewidth=3.0, alpha=0.3)
             axes.plot(at, mean, color=colour(value), linewidth=_LINE, label=title,
-                      marker=_MARKERS.get(value, 'o'), markersize=5,
-                      linestyle='--' if value == OPTIMUM else '-')
+                      marker=method_facts(value).marker, markersize=5,
+                      linestyle=method_facts(value).dash)
         axes.axhline(0.0, color=_SOFT, linewidth=0.8)
         axes.set(xlabel='perturbation ratio r', ylabel='mean decline, points',
                  xticks=ratios, xticklabels=[line.title for line in table.lines])
@@ -87,7 +80,7 @@ def success_curves(curves: Sequence[Curve], width: float) -> bytes:
     Parameters
     ----------
     curves : sequence of Curve
-        Colours tell perturbations, dashes tell surrogates.
+        Colours tell perturbations and searches, dashes tell surrogates.
     width : float
         Inches.
 
@@ -96,8 +89,8 @@ def success_curves(curves: Sequence[Curve], width: float) -> bytes:
         figure, axes = _panel(width, 3.4)
         for curve in curves:
             axes.step(curve.queries, 100.0 * curve.share, where='post', linewidth=_LINE,
-                      color=colour(curve.perturbation), label=curve.title,
-                      linestyle=_DASHES.get(curve.surrogate, '-'))
+                      color=colour(curve.method), label=curve.title,
+                      linestyle=surrogate_facts(curve.surrogate).dash)
         axes.set(xscale='log', xlabel='queries spent on a frame', ylim=(0, None),
                  ylabel='right decisions\nturned over, %' if width == NARROW
                  else 'right decisions turned over, %')
@@ -198,7 +191,7 @@ def heat_map(rows: Sequence[str], columns: Sequence[str], values: NDArray[np.flo
         return svg(figure)
 
 
-def optimum_shares(shares: Mapping[str, Mapping[str, float]], perturbations: Mapping[str, str],
+def optimum_shares(shares: Mapping[str, Mapping[str, float]], methods: Mapping[str, str],
                    width: float) -> bytes:
     """
     Draw for each attack the share of the optimum's decline: a dot a sequence, a bar the mean.
@@ -208,8 +201,8 @@ def optimum_shares(shares: Mapping[str, Mapping[str, float]], perturbations: Map
     shares : mapping of str to mapping of str to float
         Attack to sequence to share, in the order of the rows; ``''`` holds the share of the
         mean declines.
-    perturbations : mapping of str to str
-        Attack to its perturbation, for the colour.
+    methods : mapping of str to str
+        Attack to its perturbation or search, for the colour.
     width : float
         Inches.
 
@@ -218,7 +211,7 @@ def optimum_shares(shares: Mapping[str, Mapping[str, float]], perturbations: Map
         labels = _wrapped(list(shares), width)
         figure, axes = _panel(width, _height(labels) + 0.8)
         for row, (title, of) in enumerate(shares.items()):
-            paint = colour(perturbations[title])
+            paint = colour(methods[title])
             axes.barh(row, 100.0 * of[''], height=0.5, color=paint, alpha=0.45)
             dots = [100.0 * share for sequence, share in of.items() if sequence]
             axes.plot(dots, [row] * len(dots), 'o', color=paint, markersize=4.5,

@@ -112,10 +112,10 @@ def _plots(rows: Sequence[Row], cells: Sequence[Cell], groups: Sequence[list[Dec
                 lambda width: paper_plots.success_curves(successes, width))
             values['success_setting'] = tables.setting_title(guided)
     if settings:
-        shares, perturbations = curves.optimum_shares(cells, settings[0], ratio)
+        shares, methods_of = curves.optimum_shares(cells, settings[0], ratio)
         if shares:
             values['share_plot'] = _plot(
-                lambda width: paper_plots.optimum_shares(shares, perturbations, width))
+                lambda width: paper_plots.optimum_shares(shares, methods_of, width))
     targets = curves.target_map(cells, ratio)
     if targets is not None:
         values['map_plot'] = _plot(lambda width: paper_plots.heat_map(

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from functools import partial
 import math
 from typing import Any
 
@@ -22,15 +23,16 @@ from scipy import stats
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.methods import COLUMNS, is_yardstick, method_of
 from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
-KIND, SCHEMA = 'frames', 4  # of summary.json
-OPTIMUM = 'optimum'  # the perturbation that tries every flip: a yardstick, no black-box attack
+KIND, SCHEMA = 'frames', 5  # of summary.json
+
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
-CELL = ('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle', 'mode',
-        'ratio', 'edits', 'queries_per_edit', 'nodes', 'threshold', 'variant')
+CELL = ('sequence', 'target', 'asked_target', *COLUMNS, 'oracle', 'mode', 'ratio', 'edits',
+        'queries_per_edit', 'nodes', 'threshold', 'variant')
 ATTACK = CELL[1:]
 # What a row need not say.
 USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
@@ -63,7 +65,8 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
         * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
         * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
-        * ``share_of_optimum``: decline over that of ``OPTIMUM`` on the same sequence, target,
+        * ``method``: what looks for flips, a perturbation or else a search
+        * ``share_of_optimum``: decline over that of the yardstick on the same sequence, target,
           ratio, size of graph and threshold (the largest, if there are several); None without,
           or if the optimum takes nothing
         * ``duration_s``: of all repeats together
@@ -77,7 +80,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
     groups: dict[tuple[Hashable, ...], list[Row]] = defaultdict(list)
     for row in rows:
         groups[_cell_key(row)].append(row)
-    cells = [_summarise(groups[key]) for key in sorted(groups, key=_sort_key)]
+    cells = [_summarise(groups[key]) for key in sorted(groups, key=partial(_order, CELL))]
     best = _optima(cells)
     for cell in cells:
         optimum = best.get(_yardstick(cell))
@@ -112,9 +115,9 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
         if cell['decline_pp'] is not None:
             groups[tuple(cell[name] for name in ATTACK)].append(cell)
     best = _optima(cells)
-    return [{**dict(zip(ATTACK, key, strict=True)),
+    return [{**dict(zip(ATTACK, key, strict=True)), 'method': groups[key][0]['method'],
              **_over_sequences(list(filter(is_attackable, groups[key])) or groups[key], best)}
-            for key in sorted(groups, key=_sort_key)]
+            for key in sorted(groups, key=partial(_order, ATTACK))]
 
 
 def is_attackable(cell: Cell) -> bool:
@@ -161,15 +164,19 @@ def _cell_key(row: Row) -> tuple[Hashable, ...]:
     return tuple(given[name] for name in CELL)
 
 
-def _sort_key(key: tuple[Hashable, ...]) -> tuple[tuple[bool, Any], ...]:
-    # Numbers as numbers, names as names.
-    return tuple((isinstance(part, str), part) for part in key)
+def _order(names: Sequence[str], key: tuple[Hashable, ...]) -> tuple[tuple[bool, Any], ...]:
+    # Numbers as numbers, names as names; searches among perturbations.
+    row = dict(zip(names, key, strict=True))
+    parts = [method_of(row) if name == 'perturbation' else row[name] for name in names
+             if name != 'search']
+    return tuple((isinstance(part, str), part) for part in parts)
 
 
 def _summarise(rows: Sequence[Row]) -> Cell:
     rows = sorted(rows, key=lambda row: row['seed'])
     seeds = [row['seed'] for row in rows]
     cell = dict(zip(CELL, _cell_key(rows[0]), strict=True))
+    cell['method'] = method_of(cell)
     if len(set(seeds)) < len(seeds):
         raise EvaluationError(f'two rows of {cell} with one seed among {seeds}: keep one of '
                               'each, or the repeats would be counted twice')
@@ -248,7 +255,7 @@ def _yardstick(cell: Cell) -> tuple[Hashable, ...]:
 def _optima(cells: Iterable[Cell]) -> dict[tuple[Hashable, ...], float]:
     best: dict[tuple[Hashable, ...], float] = {}
     for cell in cells:
-        if cell['perturbation'] == OPTIMUM and cell['decline_pp'] is not None:
+        if is_yardstick(cell) and cell['decline_pp'] is not None:
             key = _yardstick(cell)
             best[key] = max(best.get(key, -math.inf), cell['decline_pp'])
     return best

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_facts, surrogate_facts
 from adversarial_lcd_ros.evaluation.paper.printed import (
     BUDGET_TABLE,
     PERTURBATION_TABLE,
@@ -21,21 +21,19 @@ from adversarial_lcd_ros.evaluation.paper.printed import (
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking, rank_methods
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
-    OPTIMUM,
     USUAL,
     Cell,
     declines_by_sequence,
     is_attackable,
     summarise_methods,
 )
+from adversarial_lcd_ros.registry import NONE, TARGETS
+from adversarial_lcd_ros.shown import Shown
 
 PAPER_RATIO = 3e-4
 PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'
 SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'threshold',
            'variant')
-# Columns in the order of the paper, then ours, then the yardstick.
-_ORDER = ('svm_linear', 'svm_poly', 'naive_bayes', 'svm_rbf', 'random_flip', 'random_walk',
-          'shortest_path', 'eigencentrality', 'recall', OPTIMUM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +63,7 @@ class Line:
     @property
     def strongest(self) -> Cell | None:
         """The entry with the largest decline, if it is above zero; the yardstick left out."""
-        there = [entry for entry in self.entries if entry and entry['perturbation'] != OPTIMUM
+        there = [entry for entry in self.entries if entry and not is_yardstick(entry)
                  and (entry['decline_pp'] or 0.0) > 0.0]
         return max(there, key=lambda entry: entry['decline_pp'], default=None)
 
@@ -132,15 +130,15 @@ def surrogate_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
     ratio = main_ratio(cells)
     chosen = [cell for cell in _native(cells)
               if cell['ratio'] == ratio and cell['perturbation'] == PAPER_PERTURBATION
-              and cell['surrogate'] != 'none']
-    return _tables(chosen, SURROGATE_TABLE, lambda cell: str(cell['surrogate']))
+              and cell['surrogate'] != NONE]
+    return _tables(chosen, SURROGATE_TABLE, 'surrogate', surrogate_facts)
 
 
 def perturbation_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
     """Return Table 5: perturbations, with SVM-RBF where they use a surrogate."""
     ratio = main_ratio(cells)
     chosen = [cell for cell in _perturbations(cells) if cell['ratio'] == ratio]
-    return _tables(chosen, PERTURBATION_TABLE, lambda cell: str(cell['perturbation']))
+    return _tables(chosen, PERTURBATION_TABLE, 'method', method_facts)
 
 
 def budget_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
@@ -150,13 +148,13 @@ def budget_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
         ratios = sorted({cell['ratio'] for cell in group})
         if len(ratios) < 2:
             continue
-        means = {(method['ratio'], method['perturbation']): method
+        means = {(method['ratio'], method['method']): method
                  for method in summarise_methods(group)}
-        values = _ordered({perturbation for _, perturbation in means})
+        values = _ordered({method for _, method in means}, method_facts)
         lines = tuple(Line(f'{ratio:g}', tuple(means.get((ratio, value)) for value in values))
                       for ratio in ratios)
-        tables.append(DeclineTable(BUDGET_TABLE, setting, values, tuple(map(_heading, values)),
-                                   lines))
+        tables.append(DeclineTable(BUDGET_TABLE, setting, values,
+                                   tuple(map(_heading, values)), lines))
     return tables
 
 
@@ -174,12 +172,12 @@ def _perturbations(cells: Sequence[Cell]) -> list[Cell]:
     for cell in native:
         ways.setdefault(_way(cell), set()).add(cell['surrogate'])
     preferred = {way: PAPER_SURROGATE if PAPER_SURROGATE in there else
-                 'none' if 'none' in there else min(there) for way, there in ways.items()}
+                 NONE if NONE in there else min(there) for way, there in ways.items()}
     return [cell for cell in native if cell['surrogate'] == preferred[_way(cell)]]
 
 
 def _way(cell: Cell) -> tuple[Hashable, ...]:
-    return (cell['perturbation'], *(cell[name] for name in SETTING))
+    return (cell['method'], *(cell[name] for name in SETTING))
 
 
 def _by_setting(cells: Sequence[Cell]) -> list[tuple[Cell, list[Cell]]]:
@@ -193,20 +191,20 @@ def _by_setting(cells: Sequence[Cell]) -> list[tuple[Cell, list[Cell]]]:
     return [(dict(zip(SETTING, key, strict=True)), groups[key]) for key in order]
 
 
-def _tables(cells: Sequence[Cell], printed: PrintedTable,
-            column: Callable[[Cell], str]) -> list[DeclineTable]:
+def _tables(cells: Sequence[Cell], printed: PrintedTable, column: str,
+            facts: Callable[[str], type[Shown]]) -> list[DeclineTable]:
     tables = []
     for setting, group in _by_setting(cells):
-        values = _ordered({column(cell) for cell in group})
-        if sum(value != OPTIMUM for value in values) < 2:
+        values = _ordered({cell[column] for cell in group}, facts)
+        if len({cell[column] for cell in group if not is_yardstick(cell)}) < 2:
             continue  # one column compares nothing
-        at = {(cell['sequence'], column(cell)): cell for cell in group}
+        at = {(cell['sequence'], cell[column]): cell for cell in group}
         sequences = sorted({cell['sequence'] for cell in group})
         lines = tuple(Line(sequence, tuple(at.get((sequence, value)) for value in values))
                       for sequence in sequences)
         whole = [line.title for line in lines
                  if all(entry and is_attackable(entry) for entry in line.entries)]
-        means = {column(method): method for method in summarise_methods(
+        means = {method[column]: method for method in summarise_methods(
             [cell for cell in group if cell['sequence'] in whole])}
         mean = (Line('mean', tuple(means[value] for value in values)) if whole else None)
         tables.append(DeclineTable(printed, setting, values, tuple(map(_heading, values)), lines,
@@ -214,23 +212,21 @@ def _tables(cells: Sequence[Cell], printed: PrintedTable,
     return tables
 
 
-def _ranking(cells: Sequence[Cell], column: Callable[[Cell], str]) -> Ranking | None:
-    names = {tuple(cell[factor] for factor in ATTACK): _heading(column(cell)) for cell in cells
-             if cell['perturbation'] != OPTIMUM}
+def _ranking(cells: Sequence[Cell], column: str) -> Ranking | None:
+    names = {tuple(cell[factor] for factor in ATTACK): _heading(cell[column]) for cell in cells
+             if not is_yardstick(cell)}
     declines = declines_by_sequence(cells, names)
     if len(declines) < 2 or min(map(len, declines.values())) < 2:
         return None
     return rank_methods(declines)
 
 
-def _ordered(values: set[str]) -> tuple[str, ...]:
-    known = {name: place for place, name in enumerate(_ORDER)}
-    # What is new comes before ours and the yardstick.
-    middle = known['recall'] - 0.5
-    return tuple(sorted(values, key=lambda value: (known.get(value, middle), value)))
+def _ordered(values: set[str], facts: Callable[[str], type[Shown]]) -> tuple[str, ...]:
+    return tuple(sorted(values, key=lambda value: (facts(value).rank, value)))
 
 
 def _heading(value: str) -> str:
-    if value == OPTIMUM:
-        return 'optimum (yardstick)'
-    return wording.surrogate_title(value)
+    for facts in (method_facts(value), surrogate_facts(value)):
+        if facts.title:
+            return facts.title
+    return value.replace('_', ' ')

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM, Cell
+from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_facts
+from adversarial_lcd_ros.evaluation.paper.summaries import Cell
 
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
           'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}',
@@ -35,8 +36,8 @@ def full_title(summary: Cell, usual: Cell) -> str:
 
 
 def _title(summary: Cell) -> str:
+    if is_yardstick(summary):
+        return method_facts(summary['search']).title
     title = wording.attack_title({**summary, 'name': None})
-    if summary['perturbation'] == OPTIMUM:
-        return 'optimum (yardstick)'
     asked = summary['asked_target']
     return title if asked == summary['target'] else f'{title}, asked {asked}'

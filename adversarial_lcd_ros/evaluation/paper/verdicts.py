@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
-from adversarial_lcd_ros.config import TARGETS
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.paper.printed import BUDGET_TABLE
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
-from adversarial_lcd_ros.evaluation.paper.summaries import OPTIMUM, Cell, is_attackable
+from adversarial_lcd_ros.evaluation.paper.summaries import Cell, is_attackable
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
+from adversarial_lcd_ros.registry import TARGETS
 
 PAPER_SEEDS = 10
 _FEW_FRAMES = 30
@@ -36,7 +37,7 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
 
     """
     there = [method for method in methods
-             if method['perturbation'] != OPTIMUM and method['asked_target'] == method['target']
+             if not is_yardstick(method) and method['asked_target'] == method['target']
              and method['mode'] != 'pass' and target in (None, method['target'])]
     kinds = Counter((method['nodes'], method['threshold']) for method in there).most_common(1)
     there = [method for method in there

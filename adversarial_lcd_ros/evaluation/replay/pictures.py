@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adversarial_lcd_ros.evaluation.replay.records import QueryRecord
+from adversarial_lcd_ros.evaluation.replay.records import NO_TRUTH, QueryRecord
 
 _EFFECTS = {
     'suppressed': 'The loop was found before the attack and is not found any more.',
     'diverted': 'The loop is now declared with a frame that shows too little of the same view.',
     'invented': 'Under attack a loop is declared where there is none.',
     'regained': "Only under attack the loop is found, against the attacker's purpose.",
-    'withdrawn': 'The attack made a false alarm disappear.'}
+    'withdrawn': 'The attack made a false alarm disappear.',
+    'silenced': 'A loop was declared before the attack and is not any more.',
+    'raised': 'Under attack a loop is declared where none was before.',
+    'redirected': 'The loop is now declared with another frame.'}
 _OUTCOMES = {
     'TP': ('held', 'The loop is found, attack or not.'),
     'TN': ('held', 'Rightly silent, attack or not.'),
@@ -19,9 +22,10 @@ _OUTCOMES = {
     'WM': ('wrong match', 'The loop is declared with a wrong frame, attack or not.'),
     'FP': ('false alarm', 'A loop is declared where there is none, attack or not.'),
     '': ('not scored', 'Ground truth cannot tell whether there is a loop.')}
+_UNCHANGED = 'unchanged', 'The decision is the same, attack or not.'
 # The most telling first.
-_ORDER = ('suppressed', 'invented', 'diverted', 'TP', 'TN', 'regained', 'withdrawn', 'FN', 'WM',
-          'FP', '')
+_ORDER = ('suppressed', 'invented', 'diverted', 'silenced', 'raised', 'redirected',
+          'TP', 'TN', 'regained', 'withdrawn', 'FN', 'WM', 'FP', '')
 
 
 def choose_records(run: Sequence[QueryRecord], count: int = 6) -> list[QueryRecord]:
@@ -62,7 +66,7 @@ def choose_records(run: Sequence[QueryRecord], count: int = 6) -> list[QueryReco
 def describe(record: QueryRecord, clean: QueryRecord) -> tuple[str, str]:
     """Return title and caption of the picture of an attacked frame."""
     what, text = ((record.effect, _EFFECTS[record.effect]) if record.effect
-                  else _OUTCOMES[record.outcome])
+                  else _UNCHANGED if record.kind == NO_TRUTH else _OUTCOMES[record.outcome])
     title = f'Frame {record.frame}: {what}'
     caption = (f'{text} Probability {clean.probability:.2f} clean, {record.probability:.2f} '
                f'attacked; {record.edits or 0} edges flipped of {record.edit_budget or 0} '

@@ -19,6 +19,8 @@ _LOOP_SHADE, _NEW_SHADE = '#dcebd9', '#e9e9ee'
 _ROW_HEIGHT = 1.7
 _Y_LIMITS = (-0.03, 1.15)  # above 1 is room for the marks
 
+_DOWN, _UP = ('suppressed', 'diverted', 'silenced', 'redirected'), ('invented', 'raised')
+
 Run = tuple[str, Sequence[QueryRecord]]
 
 
@@ -65,7 +67,8 @@ def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: fl
     Draw the loop probability over the sequence, clean and attacked, one row an attack.
 
     Frames with a loop are shaded green, frames at a new place grey; what is not scored is
-    white. Triangles mark suppressed (down) and invented (up) loops.
+    white. Triangles mark suppressed (down) and invented (up) loops; without ground truth those
+    silenced or redirected, and raised.
 
     Parameters
     ----------
@@ -105,7 +108,7 @@ def _shade(panel: Any, time_s: NDArray[np.float64], kind: NDArray[np.int8]) -> N
 
 def _mark(panel: Any, time_s: NDArray[np.float64], effects: NDArray[np.str_],
           colour: str) -> None:
-    for names, marker in ((('suppressed', 'diverted'), 'v'), (('invented',), '^')):
+    for names, marker in ((_DOWN, 'v'), (_UP, '^')):
         chosen = np.isin(effects, names)
         panel.plot(time_s[chosen], np.full(int(chosen.sum()), 1.08), marker, color=colour,
                    markersize=4.0, markeredgewidth=0)

@@ -110,7 +110,7 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
                 # What they log is kept with the run, and not below the user's home.
                 name, ['--ros-args', '--disable-external-lib-logs', '--params-file',
                        str(parameters), *remaps],
-                environment(domain, folder.parent / 'compiled'), folder / f'{name}.log',
+                node_environment(domain, folder.parent / 'compiled'), folder / f'{name}.log',
                 keep_stderr=name == 'bag_replay'))
         await_end(running[-1], running[:-1], tell)
     return read_recording(folder, attacked=setup.attack is not None)
@@ -127,7 +127,7 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
-def environment(domain: int, spare: Path | None = None) -> Mapping[str, str]:
+def node_environment(domain: int, spare: Path | None = None) -> Mapping[str, str]:
     """
     Return the environment of the nodes: on this machine only, in a domain of their own.
 

@@ -18,6 +18,7 @@ from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE
 
 CLEAN = 'clean'
 _KINDS = {'positive': POSITIVE, 'negative': NEGATIVE}
+NO_TRUTH = 'no_ground_truth'
 _PARSERS: dict[str, Callable[[str], Any]] = {
     'int': int, 'float': float, 'str': str, 'bool': {'0': False, '1': True}.__getitem__}
 
@@ -56,7 +57,8 @@ class QueryRecord:
     outcome : str
         TP, FN, WM, FP, TN, or empty if the frame is not scored.
     effect : str
-        Against the clean run: suppressed, diverted, invented, regained, withdrawn, or empty.
+        Against the clean run: suppressed, diverted, invented, regained, withdrawn, or empty;
+        without ground truth what ``decision_change`` says.
     status, reason, edit_budget, edits, query_budget, queries, loss_before, loss_after, duration_s
         The attacker's report; None in the clean run.
 
@@ -105,15 +107,33 @@ def make_records(labels: FrameLabels, clean: Sequence[LoopClosure],
     if CLEAN in attacks:
         raise EvaluationError(f'an attack is called {CLEAN!r}: that is the run without attack')
     records = _run_records(CLEAN, labels, clean)
-    before = [record.outcome for record in records]
+    before = list(records)
     for name, run in attacks.items():
         _check_frames(f'attack {name}: attack reports', labels.stamp_ns, run.reports)
         rows = _run_records(name, labels, run.decisions)
         records += [
             QueryRecord(**{**asdict(row), **_report_fields(report),
-                           'effect': EFFECTS.get((was, row.outcome), '')})
+                           'effect': _effect(was, row)})
             for row, was, report in zip(rows, before, run.reports, strict=True)]
     return records
+
+
+def decision_change(clean: QueryRecord, attacked: QueryRecord) -> str:
+    """
+    Return how a decision changed, whatever is right: silenced, raised, redirected, or ''.
+
+    A loop declared before is silenced, or declared with another match (redirected); one that
+    was not declared before is raised.
+    """
+    if clean.is_loop != attacked.is_loop:
+        return 'silenced' if clean.is_loop else 'raised'
+    return 'redirected' if clean.is_loop and clean.match_frame != attacked.match_frame else ''
+
+
+def _effect(clean: QueryRecord, attacked: QueryRecord) -> str:
+    if clean.kind == NO_TRUTH:
+        return decision_change(clean, attacked)
+    return EFFECTS.get((clean.outcome, attacked.outcome), '')
 
 
 def _run_records(name: str, labels: FrameLabels,

@@ -13,14 +13,21 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
 from adversarial_lcd_ros.evaluation.replay import plots
-from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, read_records, runs_of
-from adversarial_lcd_ros.evaluation.replay.summary import from_document
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    QueryRecord,
+    read_records,
+    runs_of,
+    write_records,
+)
+from adversarial_lcd_ros.evaluation.replay.summary import as_document, from_document
 from adversarial_lcd_ros.evaluation.results import (
     CONFIGURATION,
     ENVIRONMENT,
     RECORDS,
     REPORT,
     SUMMARY,
+    ResultsFolder,
     read_json,
 )
 from adversarial_lcd_ros.files import write_text
@@ -61,6 +68,14 @@ def write_report(folder: Path, summary: Mapping[str, Any], records: Sequence[Que
     return _render(folder, summary, records)
 
 
+def write_results(folder: ResultsFolder, summary: Mapping[str, Any],
+                  records: Sequence[QueryRecord], pictures: Sequence[Picture]) -> None:
+    """Write summary, records, pictures and report of an evaluation whose setup is written."""
+    folder.write_json(SUMMARY, as_document(summary))
+    write_records(folder.path / RECORDS, records)
+    write_report(folder.path, summary, records, pictures)
+
+
 def report_folder(folder: Path) -> Path:
     """
     Write report.html of a results folder anew from what is in it; return its path.
@@ -90,6 +105,7 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
     values = {
         'summary': summary, 'strongest': wording.strongest(summary), 'wording': wording,
         'headline': wording.headline(summary),
+        'labelled': wording.is_labelled(summary),
         'decline_rows': wording.decline_rows(summary),
         'figure_rows': wording.figure_rows(summary),
         'curve': None if curve is None else data_uri(curve, 'svg+xml'),
@@ -117,6 +133,8 @@ def _threshold(configuration: Mapping[str, Any]) -> float:
 
 
 def _sample(summary: Mapping[str, Any]) -> list[tuple[str, int, float]]:
+    if not wording.is_labelled(summary):
+        return []
     counts = {'positive': summary['positives'], 'negative': summary['negatives'],
               **summary['not_scored']}
     return [(text, counts[kind], counts[kind] / summary['frames'])

@@ -10,9 +10,6 @@ import shutil
 import time
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -24,7 +21,6 @@ from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
-from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.processes import (
     RECORDING,
     Recording,
@@ -37,11 +33,10 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     QueryRecord,
     make_records,
-    runs_of,
-    write_records,
 )
-from adversarial_lcd_ros.evaluation.replay.report import write_report
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.replay.report import write_results
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
+from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
     finished_in_s,
@@ -49,7 +44,7 @@ from adversarial_lcd_ros.evaluation.replay.unfinished import (
     plan_digest,
     results_folder,
 )
-from adversarial_lcd_ros.evaluation.results import RECORDS, SUMMARY, ResultsFolder
+from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
 from adversarial_lcd_ros.graph_sequences.opening import (
@@ -57,16 +52,12 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     holds_graphs,
     open_graphs,
 )
-from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames, unlabelled
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.replay import Replay
-from adversarial_lcd_ros.vision.draw import draw_attack
-
-PICTURES = 6
-BLANK_GREY = 64
 
 
 @dataclass(frozen=True)
@@ -110,9 +101,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     Parameters
     ----------
     bag : Path
-        Bag with images and ground truth, as "adversarial-lcd import" writes it; or with graphs
-        and ground truth, as "adversarial-lcd build" does: these are used as they are, whatever
-        the settings of the builder.
+        Bag with images, as "adversarial-lcd import" writes it; or with graphs, as
+        "adversarial-lcd build" does: these are used as they are, whatever the settings of the
+        builder. Without ground truth no decision is scored, and what changes is counted.
     output : Path
         Folder in which the results folder is made; an unfinished one of the same plan that is
         there is gone on with.
@@ -127,7 +118,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     Raises
     ------
     EvaluationError
-        The bag has no ground truth, a node failed, or messages were lost.
+        A node failed, or messages were lost.
 
     """
     started_s = time.monotonic()
@@ -135,8 +126,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         plan = _without_builder(bag, plan, tell)
     sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
     if sequence.trajectory is None:
-        raise EvaluationError(f'{bag} has no ground truth: without it nobody can tell what is a '
-                              'loop; import it again with --ground-truth')
+        if plan.sweep_labels:
+            raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
+        tell('no ground truth: decisions that change are counted, none can be scored')
     target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
     # Whether the nodes still live is watched here: the replay waits for them without a limit.
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1, start_timeout_s=0.0))
@@ -155,7 +147,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
             write_sweep(folder.path / SWEEP, summary['label_sweep'])
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
         _write(folder, plan, summary, records, command_line, domain,
-               _pictures(sequence, clean, runs, records, summary))
+               telling_pictures(sequence, clean, runs, records, summary))
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
         return folder.finish(), summary
@@ -165,10 +157,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
              runs: Mapping[str, Recording], plan: Plan
              ) -> tuple[list[QueryRecord], dict[str, Any]]:
     """Return the records of all runs, and what they come to."""
-    trajectory = sequence.trajectory
-    assert trajectory is not None
-    labels = label_frames(trajectory, [graph.stamp_ns for graph in clean.clean],
-                          sequence.image_size, plan.labels)
+    labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
@@ -176,8 +165,8 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         [graph.edge_count for graph in clean.clean]), plan.seed)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
-    if plan.sweep_labels:
-        summary['label_sweep'] = sweep_labels(records, trajectory, sequence.image_size,
+    if plan.sweep_labels and sequence.trajectory:
+        summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
                                               plan.labels)
     return records, summary
 
@@ -193,6 +182,14 @@ def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
         tell(f'{finished} finished runs are kept in {folder}; the same command goes on from '
              'there, "adversarial-lcd clean" clears it away')
         raise
+
+
+def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
+            plan: Plan) -> FrameLabels:
+    stamps = [graph.stamp_ns for graph in clean.clean]
+    if sequence.trajectory is None:
+        return unlabelled(stamps)
+    return label_frames(sequence.trajectory, stamps, sequence.image_size, plan.labels)
 
 
 def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
@@ -298,41 +295,4 @@ def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed,
                        {'ros_domain_id': domain})
-    folder.write_json(SUMMARY, as_document(summary))
-    write_records(folder.path / RECORDS, records)
-    write_report(folder.path, summary, records, pictures)
-
-
-def _images(sequence: CameraSequence | GraphSequence,
-            wanted: set[int]) -> dict[int, NDArray[np.uint8]]:
-    """Return the frames with these stamps; blank ones where there are only graphs."""
-    if isinstance(sequence, GraphSequence):
-        width, height = sequence.image_size
-        return dict.fromkeys(wanted, np.full((height, width, 3), BLANK_GREY, np.uint8))
-    return {frame.stamp_ns: frame.image() for frame in sequence.frames()
-            if frame.stamp_ns in wanted}
-
-
-def _pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
-              runs: Mapping[str, Recording], records: Sequence[QueryRecord],
-              summary: Mapping[str, Any]) -> list[Picture]:
-    """Return query, match and attacked graph of telling frames of the strongest attack."""
-    if not runs:
-        return []
-    strongest = max(summary['attacks'], key=lambda attack: attack['decline_pp'] or 0.0)['name']
-    by_run = runs_of(records)
-    chosen = choose_records(by_run[strongest], PICTURES)
-    wanted = {record.stamp_ns for record in chosen} | {
-        clean.clean[record.match_frame].stamp_ns for record in chosen
-        if record.match_frame is not None}
-    image = _images(sequence, wanted)
-    pictures = []
-    for record in chosen:
-        title, caption = describe(record, by_run[CLEAN][record.frame])
-        match = clean.clean[record.match_frame if record.match_frame is not None
-                            else record.frame]
-        run = runs[strongest]
-        pictures.append(Picture(f'{title} ({strongest})', caption, np.asarray(draw_attack(
-            image[record.stamp_ns], run.clean[record.frame], image[match.stamp_ns], match,
-            run.forwarded[record.frame]), np.uint8)))
-    return pictures
+    write_results(folder, summary, records, pictures)

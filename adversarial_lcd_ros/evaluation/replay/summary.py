@@ -8,10 +8,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
+from adversarial_lcd_ros.evaluation.methods import attack_columns
 from adversarial_lcd_ros.evaluation.metrics import (
     FRAME_KINDS,
     Metrics,
@@ -20,10 +22,20 @@ from adversarial_lcd_ros.evaluation.metrics import (
     measure,
     right,
 )
-from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    NO_TRUTH,
+    QueryRecord,
+    column,
+    decision_change,
+    runs_of,
+)
 from adversarial_lcd_ros.evaluation.results import summary_document
 
 KIND, SCHEMA = 'replay', 2
+# What nobody can count without ground truth.
+_NEED_LABELS = ('positives', 'negatives', 'tp', 'fn', 'fp', 'tn', 'wrong_matches', 'suppressed',
+                'diverted', 'invented', 'regained', 'withdrawn', 'wrong_closures_unscored')
 
 
 @dataclass(frozen=True)
@@ -43,8 +55,8 @@ class GraphStatistics:
         return cls(len(nodes), float(np.mean(nodes)), float(np.mean(edges)))
 
 
-def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[str, AttackConfig],
-              graphs: GraphStatistics, seed: int,
+def summarise(sequence: str, records: Sequence[QueryRecord],
+              attacks: Mapping[str, AttackConfig | None], graphs: GraphStatistics, seed: int,
               block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
     """
     Return the figures of an evaluation (``as_document``: summary.json); undefined ones are None.
@@ -56,7 +68,7 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
     records : sequence of QueryRecord
         From ``make_records``.
     attacks : mapping
-        Settings of every attack by the name of its run.
+        Settings of every attack by the name of its run; None where nobody knows them.
     graphs : GraphStatistics
         Of the clean run.
     seed : int
@@ -79,18 +91,28 @@ def summarise(sequence: str, records: Sequence[QueryRecord], attacks: Mapping[st
                               'repeated messages and gives no figure: run it again')
     block = intervals.block_frames(column(clean, 'stamp_ns'), block_s)
     kinds = Counter(record.kind for record in clean)
-    return {
-        'sequence': sequence, 'frames': len(clean), 'graphs': graphs.count,
-        'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
+    summary = {
+        'sequence': sequence, 'labelled': kinds[NO_TRUTH] < len(clean), 'frames': len(clean),
+        'graphs': graphs.count, 'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
         'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
         'negatives': kinds['negative'],
         'not_scored': {name: kinds[name] for name in FRAME_KINDS[2:]},
         'clean': _run_figures(clean, block, seed),
         'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
                     for name, run in runs.items()],
-        'seed': seed,
+        'notes': [], 'seed': seed,
         'bootstrap': {'block_s': block_s, 'block_frames': block, 'blocks': len(clean) / block,
                       'replicates': intervals.REPLICATES, 'level': intervals.LEVEL}}
+    return summary if summary['labelled'] else _without_labels(summary)
+
+
+def _without_labels(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the summary with None for all that ground truth would be needed for."""
+    def unknown(figures: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: None if name in _NEED_LABELS else value for name, value in figures.items()}
+
+    return {**unknown(summary), 'clean': unknown(summary['clean']),
+            'attacks': [unknown(attack) for attack in summary['attacks']]}
 
 
 def as_document(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -131,6 +153,7 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
     kind, outcome = column(run, 'label'), column(run, 'outcome')
     return {
         **run_metrics(run).as_dict(),
+        'loops_declared': sum(record.is_loop for record in run),
         'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
             kind, right(outcome), block, seed),
         # Outside the scored frames a closure with another place is still wrong.
@@ -141,18 +164,35 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
             column(run, 'stamp_ns'), kind, outcome)}
 
 
-def _attack_figures(name: str, config: AttackConfig, clean: Sequence[QueryRecord],
+def _attack_figures(name: str, config: AttackConfig | None, clean: Sequence[QueryRecord],
                     run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
     kind = column(clean, 'label')
     before, after = column(clean, 'outcome'), column(run, 'outcome')
     change = asdict(effect(kind, before, after))
+    # Of an attack that was only recorded nobody knows the settings.
+    known = attack_columns(config or AttackConfig())
+    settings = {**known, **{shown: getattr(config or AttackConfig(), field) for shown, field in (
+        ('ratio', 'ratio'), ('mode', 'mode'), ('edit_kinds', 'edits'), ('seed', 'seed'))}}
+    if config is None:
+        settings = dict.fromkeys(settings)
     return {
-        'name': name, 'perturbation': config.perturbation, 'surrogate': config.surrogate,
-        'ratio': config.ratio, 'mode': config.mode, 'edit_kinds': config.edits,
-        'seed': config.seed, 'decisions': len(run), **_effort(run),
-        **_run_figures(run, block, seed), **change,
+        'name': name, **settings, 'decisions': len(run), **_effort(run),
+        **_run_figures(run, block, seed), **change, **_changes(clean, run),
         'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
                                                     seed)}
+
+
+def _changes(clean: Sequence[QueryRecord], run: Sequence[QueryRecord]) -> dict[str, Any]:
+    """Count the decisions that changed, whatever is right."""
+    found = Counter(map(decision_change, clean, run))
+    changed = len(run) - found['']
+    attacked = sum(not _unattackable(record) for record in run)
+    return {
+        'silenced': found['silenced'], 'raised': found['raised'],
+        'redirected': found['redirected'], 'changed': changed,
+        # Of the frames that could be attacked; the others cannot be won.
+        'success_rate': changed / attacked if attacked else None,
+        'agreement': found[''] / len(run)}
 
 
 def _effort(run: Sequence[QueryRecord]) -> dict[str, Any]:
@@ -161,19 +201,29 @@ def _effort(run: Sequence[QueryRecord]) -> dict[str, Any]:
     skipped = Counter(record.reason or 'no reason given' for record in run
                       if _unattackable(record))
     status = Counter(record.status for record in run)
-    duration_ms = 1e3 * column(run, 'duration_s').astype(np.float64)
+    queries, duration_s = _known(run, 'queries'), _known(run, 'duration_s')
     return {
-        'edits_mean': float(np.mean(column(run, 'edits'))),
-        'edit_budget_mean': float(np.mean(column(run, 'edit_budget'))),
-        'queries_mean': float(np.mean(column(run, 'queries'))),
-        'queries_mean_attacked': (float(np.mean(column(attacked, 'queries')))
-                                  if attacked else None),
-        'queries_total': int(np.sum(column(run, 'queries'))),
+        'edits_mean': _mean(_known(run, 'edits')),
+        'edit_budget_mean': _mean(_known(run, 'edit_budget')),
+        'queries_mean': _mean(queries),
+        'queries_mean_attacked': _mean(_known(attacked, 'queries')),
+        'queries_total': None if queries is None else int(queries.sum()),
         'unattackable': len(run) - len(attacked), 'unattackable_reasons': dict(skipped),
         'success': status['success'], 'failure': status['failure'],
-        'duration_ms_median': float(np.median(duration_ms)),
-        'duration_ms_p99': float(np.quantile(duration_ms, 0.99))}
+        **{f'duration_ms_{name}': (None if duration_s is None
+                                   else 1e3 * float(np.quantile(duration_s, share)))
+           for name, share in (('median', 0.5), ('p99', 0.99))}}
+
+
+def _known(run: Sequence[QueryRecord], name: str) -> NDArray[np.float64] | None:
+    """Return a column of numbers; None if empty, or if nobody reported them."""
+    values = column(run, name)
+    return None if not len(values) or None in values else values.astype(np.float64)
+
+
+def _mean(values: NDArray[np.float64] | None) -> float | None:
+    return None if values is None else float(np.mean(values))
 
 
 def _unattackable(record: QueryRecord) -> bool:
-    return record.status == 'skipped' or not record.edit_budget
+    return record.status == 'skipped' or record.edit_budget == 0

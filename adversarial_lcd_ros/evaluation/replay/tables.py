@@ -12,6 +12,9 @@ from adversarial_lcd_ros.evaluation import wording
 
 def decline_table(summary: Mapping[str, Any]) -> Table:
     """Return what each attack took, as in the report."""
+    if not wording.is_labelled(summary):
+        return _table(f'Decisions changed on {summary["sequence"]}, which has no ground truth',
+                      wording.decline_rows(summary))
     title = (f'Decline in balanced accuracy on {summary["sequence"]}: {summary["positives"]} '
              f'frames with a loop, {summary["negatives"]} at a new place')
     return _table(title, wording.decline_rows(summary))

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation.results import PARTIAL, ResultsFolder
 
 RECORDINGS = 'recordings'
 _PLAN, _FINISHED = 'plan.json', 'finished.json'
-_BY_NAME = ('target', 'perturbation', 'surrogate')
+_BY_NAME = ('target', 'search', 'perturbation', 'surrogate', 'defences')
 # What the nodes of a run are made of: a change in a report does not make runs anew.
 _ROOMS = ('nodes', 'lcd', 'attack', 'vision', 'keyframes', 'compiled', 'weisfeiler_lehman',
           'sequences', 'graph_sequences', 'codec', 'graph', 'payload', 'config')
@@ -42,9 +42,9 @@ def plan_digest(bag: Path, sections: Mapping[str, Config | None], rebuild: bool)
     named = {value for section in settings.values() if section for value in section.values()
              if value and isinstance(value, str) and Path(value).exists()}
     # Targets and attacks of the user's own go by module and class.
-    own = sorted({value for section in settings.values() if section
-                  for name, value in section.items()
-                  if name in _BY_NAME and ':' in value})
+    own = sorted({part.strip() for section in settings.values() if section
+                  for name, value in section.items() if name in _BY_NAME
+                  for part in value.split(',') if ':' in part})
     here = environment()
     parts = {'settings': settings, 'order': list(sections), 'rebuild': rebuild,
              'files': {path: _stamps(Path(path)) for path in sorted({str(bag.resolve()), *named})},

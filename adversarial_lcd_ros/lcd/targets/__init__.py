@@ -1,27 +1,14 @@
-"""Targets by name. A new one is one small file and one line in TARGETS."""
+"""Targets by name (registry.py). A new one is one small file and one line in the table."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.lcd.targets.anchored import AnchoredTarget
-from adversarial_lcd_ros.lcd.targets.base import Scores, Target, prepare
-from adversarial_lcd_ros.lcd.targets.descriptors import DescriptorsTarget
-from adversarial_lcd_ros.lcd.targets.edges import EdgesTarget
-from adversarial_lcd_ros.lcd.targets.gnn import GnnTarget
-from adversarial_lcd_ros.lcd.targets.objects import ObjectsTarget
-from adversarial_lcd_ros.lcd.targets.vbow import VbowTarget
-from adversarial_lcd_ros.lcd.targets.wl import WlTarget
-from adversarial_lcd_ros.lcd.targets.wl_exact import WlExactTarget
+from adversarial_lcd_ros.lcd.targets.base import Scores, Target
+from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.registry import TARGETS
 
-TARGETS: dict[str, type[Target]] = {
-    target.name: target
-    for target in (WlTarget, EdgesTarget, AnchoredTarget, DescriptorsTarget, VbowTarget,
-                   ObjectsTarget, WlExactTarget, GnnTarget)
-}
-
-__all__ = ['TARGETS', 'Scores', 'Target', 'make_target', 'prepare']
+__all__ = ['TARGETS', 'Scores', 'Target', 'decision_path', 'make_target']
 
 
 def make_target(name: str, network: Path | None = None) -> Target:
@@ -31,8 +18,9 @@ def make_target(name: str, network: Path | None = None) -> Target:
     Parameters
     ----------
     name : str
+        In the table, an entry point, or ``package.module:Class``.
     network : Path, optional
-        ONNX file of a target that has one (gnn); the one that ships if not given.
+        ONNX file of a target that has one; the one that ships if not given.
 
     Raises
     ------
@@ -42,6 +30,20 @@ def make_target(name: str, network: Path | None = None) -> Target:
         The network is missing or damaged.
 
     """
-    if name not in TARGETS:
-        raise ConfigError(f'no target {name!r}; there are: {", ".join(TARGETS)}')
-    return GnnTarget(network) if name == GnnTarget.name else TARGETS[name]()
+    found: type[Target] = TARGETS.find(name)
+    return found.open(network)
+
+
+def decision_path(model: str, name: str) -> Path:
+    """
+    Return the file of a target's trained decision; its network, if it has one, is beside it.
+
+    Parameters
+    ----------
+    model : str
+        The setting ``model`` of the detector.
+    name : str
+        As for ``make_target``.
+
+    """
+    return target_path(model, TARGETS.find(name).name)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.hamming import compiled
-from adversarial_lcd_ros.lcd.targets.base import Scores
+from adversarial_lcd_ros.lcd.targets.base import Scores, Target
 from adversarial_lcd_ros.lcd.targets.scores import assign_objects
-from adversarial_lcd_ros.lcd.views import Comparison, NodeMatch, View
+from adversarial_lcd_ros.lcd.views import Comparison, Feels, NodeMatch, View
 
 # How much the place of one feature beside another may differ, over the image diagonal, and the
 # multiple of it from which nothing is left.
@@ -19,7 +19,7 @@ TOLERANCE, REACH = 0.02, 5.0
 OTHER_CLASS = 0.5
 
 
-class AnchoredTarget:
+class AnchoredTarget(Target):
     """
     Objects with the features that hang on them, as stars: alike if their arrangement recurs.
 
@@ -30,6 +30,9 @@ class AnchoredTarget:
 
     name: ClassVar[str] = 'anchored'
     channels: ClassVar[tuple[str, ...]] = ('stars',)
+    feels: ClassVar[Feels] = Feels.AT_OBJECTS
+    query_s: ClassVar[float] = 0.6e-3
+    flip_s: ClassVar[float] = 8e-6
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the score of a query with every reference, shape (r, 1)."""

@@ -7,15 +7,17 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.targets.scores import descriptor_score
-from adversarial_lcd_ros.lcd.views import Comparison, View
+from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
 
 
-class DescriptorsTarget:
+class DescriptorsTarget(Target):
     """Nothing but matched features."""
 
     name: ClassVar[str] = 'descriptors'
     channels: ClassVar[tuple[str, ...]] = ('features',)
+    feels: ClassVar[Feels] = Feels.NONE
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 1)."""

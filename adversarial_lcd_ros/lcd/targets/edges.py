@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.flip_channels import EdgeFlips
+from adversarial_lcd_ros.lcd.single_flips import FlipChannel
+from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.targets.scores import edge_score
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
-class EdgesTarget:
+class EdgesTarget(Target):
     """Nothing but edges between matched features."""
 
     name: ClassVar[str] = 'edges'
     channels: ClassVar[tuple[str, ...]] = ('edges',)
+    flip_channels: ClassVar[Sequence[type[FlipChannel]]] = (EdgeFlips,)
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 1)."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.targets.scores import share
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.paths import model_path
@@ -38,7 +39,7 @@ def network_inputs(view: View) -> tuple[NDArray[np.float32], NDArray[np.float32]
     return features, weight / np.maximum(weight.sum(axis=1, keepdims=True), np.float32(1e-12))
 
 
-class GnnTarget:
+class GnnTarget(Target):
     """
     Matched features, weighed by the cosine of their embeddings.
 
@@ -59,6 +60,9 @@ class GnnTarget:
 
     name: ClassVar[str] = 'gnn'
     channels: ClassVar[tuple[str, ...]] = ('matches',)
+    trainer: ClassVar[str] = 'adversarial_lcd_ros.training.gnn:GnnTrainer'
+    query_s: ClassVar[float] = 3.5e-3
+    flip_s: ClassVar[float] = 3.5e-3
 
     def __init__(self, network: Path | None = None) -> None:
         import onnxruntime  # the other targets start sooner without it
@@ -78,6 +82,11 @@ class GnnTarget:
             raise ModelError(f'{path} has inputs {names}: expected {INPUTS} and the output '
                              f'{OUTPUT}')
         self._kept: WeakKeyDictionary[View, NDArray[np.float32]] = WeakKeyDictionary()
+
+    @classmethod
+    def open(cls, network: Path | None) -> Target:
+        """Return the target with the network of a file; the one that ships if not given."""
+        return cls(network)
 
     def embed(self, view: View) -> NDArray[np.float32]:
         """Return the embedding of every node, unit rows, (n, d)."""

@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.targets.scores import assign_objects, share
-from adversarial_lcd_ros.lcd.views import Comparison, View
+from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
 
 # Lengths over the image diagonal: how far a neighbour counts, how much an edge may differ.
 REACH, TOLERANCE = 0.3, 0.05
 
 
-class ObjectsTarget:
+class ObjectsTarget(Target):
     """
     Objects of the same class and of similar size among similar neighbours; and their edges.
 
@@ -24,6 +25,9 @@ class ObjectsTarget:
 
     name: ClassVar[str] = 'objects'
     channels: ClassVar[tuple[str, ...]] = ('objects', 'edges')
+    feels: ClassVar[Feels] = Feels.AT_OBJECTS
+    query_s: ClassVar[float] = 2.5e-3
+    flip_s: ClassVar[float] = 40e-6
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores (objects, edges) of a query with every reference, shape (r, 2)."""

@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.keyframes.database import bow_score
-from adversarial_lcd_ros.lcd.views import Comparison, View
+from adversarial_lcd_ros.lcd.targets.base import Target
+from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
 
 
-class VbowTarget:
+class VbowTarget(Target):
     """The DBoW L1 score that also retrieves the candidates."""
 
     name: ClassVar[str] = 'vbow'
     channels: ClassVar[tuple[str, ...]] = ('words',)
+    feels: ClassVar[Feels] = Feels.NONE
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the DBoW L1 score of a query with every reference, shape (r, 1)."""

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.flip_channels import EdgeFlips, NeighbourhoodFlips, ObjectFlips
 from adversarial_lcd_ros.lcd.kernels import changed_nodes
-from adversarial_lcd_ros.lcd.targets.base import Scores
+from adversarial_lcd_ros.lcd.single_flips import FlipChannel
+from adversarial_lcd_ros.lcd.targets.base import Scores, Target
 from adversarial_lcd_ros.lcd.targets.scores import NeighbourhoodScore, ObjectScore, edge_score
 from adversarial_lcd_ros.lcd.views import Comparison, View
 
 
-class WlTarget:
+class WlTarget(Target):
     """Edges that recur, features in their neighbourhoods, objects with what surrounds them."""
 
     name: ClassVar[str] = 'wl'
     channels: ClassVar[tuple[str, ...]] = ('edges', 'features', 'objects')
+    flip_channels: ClassVar[Sequence[type[FlipChannel]]] = (
+        EdgeFlips, NeighbourhoodFlips, ObjectFlips)
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 3)."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.graph import OBJECT_TIER
+from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.views import Comparison, View
 from adversarial_lcd_ros.weisfeiler_lehman.histogram import Histogram, histogram
 
@@ -19,7 +20,7 @@ ITERATIONS = 1
 _OBJECT_BIT = np.uint32(1 << 31)
 
 
-class WlExactTarget:
+class WlExactTarget(Target):
     """
     Labels of nodes and of their neighbourhoods that are the same, to the last neighbour.
 
@@ -30,6 +31,8 @@ class WlExactTarget:
 
     name: ClassVar[str] = 'wl_exact'
     channels: ClassVar[tuple[str, ...]] = ('kernel',)
+    query_s: ClassVar[float] = 1.3e-3
+    flip_s: ClassVar[float] = 1.3e-3
 
     def __init__(self) -> None:
         # A keyframe is compared with many queries.
