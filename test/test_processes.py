@@ -248,7 +248,7 @@ def test_a_domain_that_is_none_is_refused(monkeypatch, text):
 
 @pytest.mark.parametrize('arguments', [
     ('-m', 'adversarial_lcd_ros.cli', 'demo'),
-    ('-m', 'adversarial_lcd_ros.cli', 'evaluate', 'somewhere'),
+    ('-m', 'adversarial_lcd_ros.cli', 'evaluate', str(TOUR)),
     ('-m', 'adversarial_lcd_ros.nodes.lcd', '--help')])
 def test_without_ros_one_line_names_the_extra(tmp_path, arguments):
     (tmp_path / 'rclpy.py').write_text('raise ImportError("librcl.so: not found")')
