@@ -17,6 +17,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
+COMPILED := $(VENV)/.compiled
 NODES := attacker bag_replay graph_builder lcd
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 
@@ -58,8 +59,14 @@ bench: model $(BENCHABLE)
 
 setup: model
 
-model: $(INSTALLED)
+model: $(INSTALLED) $(COMPILED)
 	@$(BIN)/adversarial-lcd fetch-model >/dev/null
+
+# What changes no compiled function is loaded again at once.
+$(COMPILED): $(INSTALLED)
+	@echo 'compiling (half a minute, once)'
+	@$(BIN)/adversarial-lcd compile >/dev/null
+	@touch $@
 
 # With ROS 2 sourced its own rclpy is used; otherwise PyPI's wheels of ROS 2 Jazzy are.
 # The links are what "pip install ." and colcon make: executables where "ros2 run" looks.

@@ -34,9 +34,9 @@ exec "$python" "$self" "$@"
 '''
 import sys
 
-from {package}.nodes.{node} import main
+from {package}.start import {node}
 
-sys.exit(main())
+sys.exit({node}())
 """
 
 

@@ -1,30 +1,17 @@
 """
 The command ``adversarial-lcd``: parse, call one function of the core, show what it returns.
 
-Every module that costs time to import is imported by the command that needs it, when it runs.
+What signals mean is settled before anything is imported that costs time.
 """
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
 from collections.abc import Sequence
 import signal
 import sys
 
-from adversarial_lcd_ros import __version__
-from adversarial_lcd_ros.commands import (
-    build,
-    compare,
-    evaluate,
-    fetch_model,
-    importing,
-    inspect,
-    params,
-    report,
-    targets,
-    train,
-)
 from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.start import ignore_signals, interruptible, write_plainly
 
 EXIT_OK, EXIT_ERROR, EXIT_INTERRUPTED = 0, 2, 130
 
@@ -35,33 +22,43 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     0: done; 2: the command line or an input is wrong, said in one line; 130: interrupted, by
     SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Command line without the program. That of the process if not given: then the process is
+        taken to be this command's own, and ends within two seconds of a signal.
+
     """
-    options = _parser().parse_args(argv)
-    # A cluster or a shell that ends us gets the same tidy end as Ctrl-C.
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    before = signal.getsignal(signal.SIGTERM)
+    if argv is None:
+        interruptible(EXIT_INTERRUPTED)
+    else:
+        # A cluster or a shell that ends us gets the same tidy end as Ctrl-C.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        return _run(argv)
+    except KeyboardInterrupt:
+        print('interrupted', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    finally:
+        if argv is None:
+            ignore_signals()
+        else:
+            signal.signal(signal.SIGTERM, before)
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    from adversarial_lcd_ros.commands.parser import make_parser
+
+    write_plainly()
+    options = make_parser().parse_args(argv)
     try:
         options.run(options)
     except AdversarialLcdError as error:
         print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
         return EXIT_ERROR
-    except KeyboardInterrupt:
-        print('interrupted', file=sys.stderr)
-        return EXIT_INTERRUPTED
-    finally:
-        signal.signal(signal.SIGTERM, before)
     return EXIT_OK
-
-
-def _parser() -> ArgumentParser:
-    parser = ArgumentParser(
-        prog='adversarial-lcd',
-        description='Measure how easily graph-based loop closure detection is fooled.')
-    parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
-    commands = parser.add_subparsers(metavar='COMMAND', required=True)
-    for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                compare.add, targets.add, train.add, fetch_model.add, inspect.add, params.add):
-        add(commands)
-    return parser
 
 
 if __name__ == '__main__':

@@ -285,9 +285,12 @@ class ReplayConfig(Config):
     loop: int = setting(
         1, 'How often the bag is replayed; stamps go on rising.', low=1, high=1_000_000)
     clock: bool = setting(True, 'Publish /clock.')
+    start_timeout_s: float = setting(
+        30.0, 'Wait so long for the other nodes at the start, seconds, and anew while one of '
+        'them is loading or compiling. 0: as long as it takes.', low=0.0, high=1e6)
     timeout_s: float = setting(
-        30.0, 'Wait so long for subscribers at the start, and in lockstep for a decision, '
-        'seconds.', low=0.1, high=1e6)
+        30.0, 'In lockstep wait so long for a decision, and at the end for the rest, seconds.',
+        low=0.1, high=1e6)
 
 
 @dataclass(frozen=True)

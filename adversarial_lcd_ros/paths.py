@@ -77,12 +77,26 @@ def target_path(chosen: str, target: str) -> Path:
 
 
 def cache_folder() -> Path:
-    """Return the folder of provisioned files; ADVERSARIAL_LCD_CACHE overrides the XDG default."""
+    """
+    Return the folder of provisioned files; ADVERSARIAL_LCD_CACHE overrides the XDG default.
+
+    Raises
+    ------
+    ModelError
+        The user has no home, and nothing else is said.
+
+    """
     chosen = os.environ.get('ADVERSARIAL_LCD_CACHE')
     if chosen:
         return Path(chosen)
-    base = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(base) / PACKAGE
+    base = os.environ.get('XDG_CACHE_HOME')
+    if base:
+        return Path(base) / PACKAGE
+    try:
+        return Path.home() / '.cache' / PACKAGE
+    except RuntimeError as error:
+        raise ModelError('this user has no home folder to keep models and graphs in: set '
+                         'ADVERSARIAL_LCD_CACHE to a folder that can be written') from error
 
 
 def object_model_path() -> Path:

@@ -24,6 +24,7 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery
 from adversarial_lcd_ros.config import PERTURBATIONS
+from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.processes import node_environment
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import _graph_messages
@@ -48,10 +49,12 @@ QUERY = {'mode': 'query', 'deadline_ms': DEADLINE_S * 1e3}
 @pytest.fixture(autouse=True)
 def loopback(monkeypatch):
     """Put this process and those that it starts into one domain, on this machine only."""
-    for name, value in node_environment().items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
-        (str(Path(__file__).parents[1]), str(Path(__file__).parent))))
+    with own_domain() as domain:
+        for name, value in node_environment(domain).items():
+            monkeypatch.setenv(name, value)
+        monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
+            (str(Path(__file__).parents[1]), str(Path(__file__).parent))))
+        yield
 
 
 @contextmanager

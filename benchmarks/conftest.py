@@ -83,7 +83,8 @@ def _keep(name, size, ours_s, rival, rival_s, mark, higher_is_better):
     if mark is not None:
         met = bool(ratio >= mark if higher_is_better else ours_s <= mark)
     _rows.append({'name': name, 'size': size, 'ours_s': float(ours_s), 'rival': rival,
-                  'rival_s': rival_s, 'ratio': ratio, 'mark': mark, 'met': met})
+                  'rival_s': rival_s, 'ratio': ratio, 'mark': mark, 'met': met,
+                  'mark_is_ratio': higher_is_better})
     return _rows[-1]
 
 

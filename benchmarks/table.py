@@ -18,9 +18,11 @@ def seconds(value):
 
 
 def line(row):
-    """Return a row in Markdown; a mark at or above one is a ratio, below it seconds."""
+    """Return a row in Markdown."""
+    # Rows of earlier releases do not say what their mark is: at or above one it was a ratio.
+    is_ratio = row.get('mark_is_ratio', (row['mark'] or 0) >= 1)
     mark = '' if row['mark'] is None else (
-        f'{row["mark"]:g} x' if row['mark'] >= 1 else seconds(row['mark']))
+        f'{row["mark"]:g} x' if is_ratio else seconds(row['mark']))
     met = {None: '', True: 'yes', False: '**no**'}[row['met']]
     rival = '' if row['rival'] is None else f'{row["rival"]}: {seconds(row["rival_s"])}'
     ratio = '' if row['ratio'] is None else f'{row["ratio"]:.3g}'

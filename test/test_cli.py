@@ -12,7 +12,8 @@ from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.settings import render_parameters
 
-COMMANDS = ('demo', 'import', 'evaluate', 'report', 'train', 'fetch-model', 'inspect', 'params')
+COMMANDS = ('demo', 'import', 'evaluate', 'report', 'train', 'fetch-model', 'compile', 'clean',
+            'inspect', 'params')
 
 
 def wire(payload):

@@ -44,13 +44,14 @@ def test_wire_and_offline_agree_decision_by_decision(tour, tmp_path, monkeypatch
         'recall': AttackConfig(search='recall', max_queries=8),
         'paper': AttackConfig(queries_per_edit=1, max_queries=6)}
     runs = {}
-    replay = live._replay
+    replay = live.Replays.run
 
-    def replay_and_keep(*arguments):
-        runs.update(replay(*arguments))
-        return dict(runs)
+    def replay_and_keep(self):
+        made, earlier_s = replay(self)
+        runs.update(made)
+        return made, earlier_s
 
-    monkeypatch.setattr(live, '_replay', replay_and_keep)
+    monkeypatch.setattr(live.Replays, 'run', replay_and_keep)
     folder, summary = evaluate_live(
         tour, tmp_path / 'results', Plan(NO_NETWORK, LcdConfig(), LabelConfig(), THIN, attacks))
 

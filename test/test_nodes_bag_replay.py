@@ -158,14 +158,14 @@ def test_topics_can_be_remapped_and_clock_left_out(ros, bag, frames):
 
 
 def test_without_a_subscriber_the_replay_fails(ros, bag):
-    node = replay(ros, bag, timeout_s=0.3)
+    node = replay(ros, bag, start_timeout_s=0.3)
     with pytest.raises(EvaluationError, match='no subscriber of /image/compressed'):
         node.work(ros.spin)
 
 
 def test_lockstep_without_a_detector_fails(ros, bag, vocabulary):
     ros.start(GraphBuilderNode, detector='none', vocabulary=vocabulary)
-    node = replay(ros, bag, lockstep=True, timeout_s=0.5)
+    node = replay(ros, bag, lockstep=True, start_timeout_s=0.5)
     with pytest.raises(EvaluationError, match='no publisher of /loop_closures'):
         node.work(ros.spin)
 

@@ -10,6 +10,7 @@ import time
 import pytest
 
 from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
@@ -23,8 +24,6 @@ NODES = ('graph_builder', 'attacker', 'lcd', 'bag_replay')
 ROOT = Path(__file__).resolve().parents[1]
 TOUR = ROOT / 'bags' / 'flat_tour'
 FRAMES, FRAME_S = 12, 0.2
-# One for each test process: workers and other pipelines on this machine stay apart.
-DOMAIN = 1 + os.getpid() % 100
 
 
 def as_module(name):
@@ -41,10 +40,10 @@ def as_executable(name):
 class Processes:
     """Nodes as processes; whatever is left at the end is killed."""
 
-    def __init__(self, folder, command):
+    def __init__(self, folder, command, domain):
         self._folder, self._command = folder, command
         self._running = {}
-        self._environment = os.environ | {'ROS_DOMAIN_ID': str(DOMAIN)}
+        self._environment = os.environ | {'ROS_DOMAIN_ID': str(domain)}
         if command is as_module:
             self._environment['PYTHONPATH'] = os.pathsep.join(
                 filter(None, [str(ROOT), os.getenv('PYTHONPATH')]))
@@ -77,15 +76,22 @@ class Processes:
 
 
 @pytest.fixture
-def await_node(monkeypatch):
+def domain():
+    """Hold a domain: workers and other pipelines on this machine stay apart."""
+    with own_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def await_node(monkeypatch, domain):
     """Return a function that waits until a node of a name is on the wire."""
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     context = Context()
-    rclpy.init(args=[], context=context, domain_id=DOMAIN,
+    rclpy.init(args=[], context=context, domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
     observer = rclpy.create_node('observer', context=context, use_global_arguments=False)
 
-    def wait(name, deadline_s=30):
+    def wait(name, deadline_s=120):
         end_s = time.monotonic() + deadline_s
         while name not in observer.get_node_names():
             assert time.monotonic() < end_s, f'{name} did not start'
@@ -99,9 +105,9 @@ def await_node(monkeypatch):
 
 
 @pytest.fixture(params=[as_module, as_executable])
-def processes(request, tmp_path, monkeypatch):
+def processes(request, tmp_path, monkeypatch, domain):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    started = Processes(tmp_path, request.param)
+    started = Processes(tmp_path, request.param, domain)
     yield started
     started.kill()
 

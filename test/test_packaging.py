@@ -89,7 +89,7 @@ def test_every_node_has_an_entry_point():
     setup = ConfigParser()
     setup.read(ROOT / 'setup.cfg')
     scripts = setup['options.entry_points']['console_scripts']
-    found = re.findall(r'^(\w+) = adversarial_lcd_ros\.nodes\.(\w+):main$', scripts, re.MULTILINE)
+    found = re.findall(r'^(\w+) = adversarial_lcd_ros\.start:(\w+)$', scripts, re.MULTILINE)
     assert sorted(found) == [(node, node) for node in NODES]
     for node in NODES:
         assert (ROOT / PACKAGE / 'nodes' / f'{node}.py').is_file()

@@ -5,9 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+import os
 from pathlib import Path
 import sys
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 TABLE_WIDTH = 150
 Commands: TypeAlias = '_SubParsersAction[ArgumentParser]'
@@ -36,8 +40,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 
 def print_rows(title: str, rows: Sequence[Mapping[str, str]]) -> None:
-    """Print rows of heading to cell as a table; where there is no terminal, as wide as it is."""
-    from rich.console import Console
+    """Print rows of heading to cell as a table."""
     from rich.table import Table
 
     table = Table(title=title, title_justify='left')
@@ -45,7 +48,22 @@ def print_rows(title: str, rows: Sequence[Mapping[str, str]]) -> None:
         table.add_column(heading, justify='left' if index == 0 else 'right')
     for row in rows:
         table.add_row(*row.values())
-    Console(width=None if sys.stdout.isatty() else TABLE_WIDTH).print(table)
+    make_console().print(table)
+
+
+def make_console(*, stderr: bool = False) -> Console:
+    """
+    Return what prints tables and figures, as wide as the terminal or COLUMNS, else 150 columns.
+
+    Brackets and colons in names are what they are: no markup, no emoji.
+    """
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    # Where there is no terminal there is no width to keep to.
+    known = stream.isatty() or 'COLUMNS' in os.environ
+    return Console(width=None if known else TABLE_WIDTH, stderr=stderr, markup=False,
+                   emoji=False, highlight=False)
 
 
 def add_source_options(parser: ArgumentParser) -> None:
@@ -121,11 +139,17 @@ def imported_source(source: str, options: Namespace, *, replayed: bool = False) 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on stderr; yield what is to be called with the work done and the whole."""
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
-    with Progress(*Progress.get_default_columns()[:2], MofNCompleteColumn(),
-                  TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+    with Progress(TextColumn('{task.description}', markup=False), BarColumn(),
+                  MofNCompleteColumn(), TimeRemainingColumn(),
+                  console=make_console(stderr=True)) as bar:
         task = bar.add_task(title, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 

@@ -10,12 +10,12 @@ from typing import Any
 
 from adversarial_lcd_ros.commands import evaluate_frames
 from adversarial_lcd_ros.commands.common import (
-    TABLE_WIDTH,
     Commands,
     add_command,
     add_json_option,
     add_source_options,
     imported_source,
+    make_console,
     print_json,
     source_options,
     tell,
@@ -34,11 +34,15 @@ from adversarial_lcd_ros.settings import (
     chosen_settings,
     config_from_options,
 )
+from adversarial_lcd_ros.start import ros_problem
 
 RECIPE = 'quick'
 DEMO_BAG = 'bags/flat_tour'
 # Frames under way at once: the nodes work side by side, and nothing is lost.
 LIVE_WINDOW = 4
+# A node that hangs, or refused a frame, is noticed: until then any attack may take its time, also
+# on a machine that is busy with other work.
+LIVE_TIMEOUT_S = 600.0
 # A class, and what its options start with where another class of the command has the name too.
 EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
              (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
@@ -136,6 +140,10 @@ def _demo(options: Namespace) -> None:
 
 
 def _evaluate_bag(bag: Path, options: Namespace) -> None:
+    problem = ros_problem()
+    if problem:
+        raise ConfigError(problem)
+
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
 
@@ -143,7 +151,7 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
     plan = Plan(config_from_options(options, BuilderConfig),
                 config_from_options(options, LcdConfig),
                 config_from_options(options, LabelConfig),
-                replace(ReplayConfig(window=LIVE_WINDOW),
+                replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
                 attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
@@ -153,8 +161,6 @@ def _evaluate_bag(bag: Path, options: Namespace) -> None:
 
 def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     """Print the tables and the main finding of an evaluation."""
-    from rich.console import Console
-
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
     from adversarial_lcd_ros.evaluation.replay.tables import (
         decline_table,
@@ -166,8 +172,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
         return
-    # Where there is no terminal there is no width to keep to.
-    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
+    console = make_console()
     console.print(figure_table(summary))
     console.print(decline_table(summary))
     if 'label_sweep' in summary:

@@ -12,7 +12,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from adversarial_lcd_ros.commands.common import TABLE_WIDTH, print_json, progress_bar, tell
+from adversarial_lcd_ros.commands.common import make_console, print_json, progress_bar, tell
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -184,20 +184,18 @@ def _workers(options: Namespace) -> AbstractContextManager[Run]:
 @contextmanager
 def _bar(sweep: Sweep) -> Iterator[Callable[[float, float], None]]:
     """Show cells and time left; the time by the expected costs, the cells as they are counted."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
 
     count = TextColumn('{task.fields[cells]} of {task.fields[all]} cells')
     with Progress(count, BarColumn(), TextColumn('{task.percentage:.0f} %'), TimeElapsedColumn(),
-                  TextColumn('left'), TimeLeftColumn(), console=Console(stderr=True),
+                  TextColumn('left'), TimeLeftColumn(), console=make_console(stderr=True),
                   speed_estimate_period=600) as bar:
         task = bar.add_task('', total=1.0, cells=sweep.finished, all=len(sweep.keys))
         yield lambda cells, share: bar.update(task, completed=share, cells=cells)
 
 
 def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from adversarial_lcd_ros.evaluation.frames.run import kinds_of_cells
@@ -206,7 +204,7 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
                   title='Processor time a frame')
     for kind, frames, seconds in kinds_of_cells(rows):
         table.add_row(kind, str(frames), *(f'{1e3 * part:.1f}' for part in seconds))
-    console = Console(width=None if sys.stdout.isatty() else TABLE_WIDTH)
+    console = make_console()
     console.print(table)
     releases = sorted({row['versions'] for row in rows})
     if len(releases) > 1:

@@ -13,6 +13,7 @@ from adversarial_lcd_ros.commands.common import (
     add_command,
     add_json_option,
     add_source_options,
+    make_console,
     print_json,
     print_rows,
     source_options,
@@ -119,10 +120,9 @@ def _print_words(words: Mapping[str, str]) -> None:
 
 
 def _print_bag(bag: BagSummary) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = make_console()
     topics = Table('topic', 'type', 'messages', 'payload')
     graphs = Table('topic', 'nodes n', 'edges m', 'objects',
                    title='graphs: mean (least to largest)', title_justify='left')
@@ -140,11 +140,9 @@ def _print_bag(bag: BagSummary) -> None:
 
 
 def _show_payload(name: str, content: Any) -> None:
-    from rich.console import Console
-
     from adversarial_lcd_ros.graph import MultiTierGraph
 
-    console = Console(highlight=False)
+    console = make_console()
     graph = content if isinstance(content, MultiTierGraph) else getattr(content, 'graph', None)
     if graph is None:
         console.print(content, soft_wrap=True)

@@ -8,19 +8,19 @@ numba's cache on disk, so only the first process on a machine compiles.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.caching import compiled_with
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES
 
 LANES = DESCRIPTOR_BYTES // 8
 _FAR = 8 * DESCRIPTOR_BYTES + 1
-compiled: Callable[..., Any] = njit(cache=True, nogil=True)
+compiled = compiled_with()
 
 
 def _population_count(_: Any, value: Any) -> Any:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import exp
-from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.compiled.caching import compiled_with
+
 LENGTH_SCALE = 0.1
 # Sums may be reordered to use vector registers; one function orders them in one way.
-vectorised: Callable[..., Any] = njit(cache=True, nogil=True, error_model='numpy',
-                                      fastmath={'reassoc', 'contract'})
+vectorised = compiled_with(error_model='numpy', fastmath={'reassoc', 'contract'})
 
 Incidence = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 

@@ -17,7 +17,7 @@ from adversarial_lcd_ros.files import write_json
 SUMMARY, RECORDS, REPORT = 'summary.json', 'per_query.csv', 'report.html'
 CONFIGURATION, ENVIRONMENT, PICTURES = 'configuration.json', 'environment.json', 'pictures'
 LATEST = 'latest'
-_PARTIAL = '.partial'
+PARTIAL = '.partial'
 
 class ResultsFolder:
     """
@@ -85,7 +85,7 @@ class ResultsFolder:
                    if not (self.path / name).is_file()]
         if missing:
             raise EvaluationError(f'{self.path} is not complete: {", ".join(missing)} missing')
-        final = self.path.with_name(self.path.name.removesuffix(_PARTIAL))
+        final = self.path.with_name(self.path.name.removesuffix(PARTIAL))
         link, draft = final.parent / LATEST, final.parent / f'.{LATEST}-{final.name}'
         if link.exists() and not link.is_symlink():
             raise EvaluationError(f'{link} is in the way: expected a symbolic link or nothing; '
@@ -102,7 +102,7 @@ def _new_folder(root: Path, name: str) -> Path:
     number = 1
     while True:
         unique = name if number == 1 else f'{name}-{number}'
-        path = root / (unique + _PARTIAL)
+        path = root / (unique + PARTIAL)
         if not (root / unique).exists():
             try:
                 path.mkdir()

@@ -40,7 +40,8 @@ def local_workers(jobs: int) -> Iterator[Run]:
                                initializer=_begin_worker)
 
     def run(function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
-        futures: list[Future[Any]] = [pool.submit(function, task) for task in tasks]
+        with _deaf_children():
+            futures: list[Future[Any]] = [pool.submit(function, task) for task in tasks]
         try:
             for future in as_completed(futures):
                 yield future.result()
@@ -59,6 +60,16 @@ def local_workers(jobs: int) -> Iterator[Run]:
         raise
     finally:
         pool.shutdown()
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Let processes that are started here never hear Ctrl-C, not even while they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin_worker() -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('attacker'))
+
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import wait
 from dataclasses import replace
-import sys
 from threading import Condition, Thread
 import time
 from typing import Any
@@ -20,13 +24,13 @@ from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import DEADLINE
 from adversarial_lcd_ros.errors import CodecError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.nodes.compiled import load_for_attacker
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.oracle import TopicOracle
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.sideline import Sideline
 from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.preloading import load_for_attacker
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 INPUT, OUTPUT = 'graph_clean', 'graph'
@@ -58,6 +62,7 @@ class AttackerNode(PipelineNode):
         self._config, self._node_config, self._limits = self.settings
         self._refuse_loop()
         self._attacker = Attacker(self._config)
+        self.say('compiling')
         load_for_attacker(self._config)
         self._oracle = TopicOracle(self, self.diagnostics, self._node_config.query_timeout_s)
         self._watch = GraphWatch(self.diagnostics)
@@ -205,7 +210,3 @@ class AttackerNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(AttackerNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('bag_replay'))
+
 from collections.abc import Callable, Sequence
 import importlib
 from pathlib import Path
-import sys
 import time
 from typing import Any
 
@@ -18,12 +22,14 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
+from adversarial_lcd_ros.nodes.peers import Strangers, getting_ready
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import SessionWatch
 from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
+from adversarial_lcd_ros.start import report
 
 GRAPHS = CLEAN, _ = 'graph_clean', 'graph'
 DECISIONS, REPORTS = 'loop_closures', 'attack_report'
@@ -37,6 +43,9 @@ _LONG_S = 10.0
 # The other ends have matched as seen from here; this is for them to see it too, and each other.
 # A quarter of a second was too short once on a busy machine: the first graph was lost.
 _SETTLE_S = 1.0
+_LOOK_PERIOD_S = 1.0
+# What a supervisor is told once the other nodes are there.
+_PLAYING = 'playing'
 
 
 class Stopped(Exception):  # noqa: N818
@@ -73,6 +82,8 @@ class BagReplayNode(PipelineNode):
             for topic in (RECORDED if self._recorder else (DECISIONS,))}
         self._broken: Exception | None = None
         self._restarts = SessionWatch(self.diagnostics, 'lcd', 'its keyframes are gone')
+        self._strangers = Strangers(self, RECORDED)
+        self._look_due_s = 0.0
         self._under_way: dict[int, float] = {}
         self._published = self._decided = self._time_ns = 0
         self._origin: tuple[float, int] | None = None
@@ -92,6 +103,8 @@ class BagReplayNode(PipelineNode):
     def _handler(self, topic: str) -> Callable[[bytes], None]:
         def on_message(wire: bytes) -> None:
             self.diagnostics.count(f'received {topic}')
+            if self._recorder:
+                self._strangers.heard(topic, wire)
             self._record(topic, wire)
             if topic == DECISIONS:
                 self._on_decision(wire)
@@ -122,6 +135,7 @@ class BagReplayNode(PipelineNode):
         self._spin = spin
         try:
             self._await_listeners()
+            report(_PLAYING)
             began_s = time.monotonic()
             with progress(self.default_name, self._replay.frame_count) as show:
                 self._play(show)
@@ -150,6 +164,7 @@ class BagReplayNode(PipelineNode):
             self._time_ns = stamp_ns
             if is_frame:
                 self._under_way[stamp_ns] = time.monotonic()
+                self._strangers.sent(stamp_ns)
                 self._published += 1
             self._outputs[topic].publish(cdr)
             self.diagnostics.count('published messages')
@@ -160,6 +175,16 @@ class BagReplayNode(PipelineNode):
             raise Stopped
         if self._broken is not None:
             raise self._broken
+        if self._recorder:
+            self._refuse_strangers()
+
+    def _refuse_strangers(self) -> None:
+        """Fail where others are on the topics: what is recorded would be theirs, too."""
+        if time.monotonic() >= self._look_due_s:
+            self._look_due_s = time.monotonic() + _LOOK_PERIOD_S
+            self._strangers.look()
+        if self._strangers.found:
+            raise EvaluationError(self._strangers.found)
 
     def _until(self, condition: Callable[[], bool]) -> bool:
         """Run callbacks until the condition holds; False after timeout_s."""
@@ -172,19 +197,26 @@ class BagReplayNode(PipelineNode):
 
     def _await_listeners(self) -> None:
         """Wait until the first frame will be heard, all along the pipeline."""
-        settled_s = time.monotonic() + _SETTLE_S
-
-        def settled() -> bool:
-            nonlocal settled_s
+        limit_s = self._config.start_timeout_s
+        waited_since_s = settled_since_s = looked_s = time.monotonic()
+        while True:
+            now_s = time.monotonic()
             self.diagnostics.waiting_for = self._missing()
             if self.diagnostics.waiting_for:
-                settled_s = time.monotonic() + _SETTLE_S
-            return time.monotonic() >= settled_s
-
-        if not self._until(settled):
-            raise EvaluationError(
-                f'no {self.diagnostics.waiting_for} within {self._config.timeout_s:g} s: are the '
-                'other nodes running, and remapped alike?')
+                settled_since_s = now_s
+            elif now_s - settled_since_s >= _SETTLE_S:
+                return
+            late = bool(limit_s) and now_s - waited_since_s >= limit_s
+            if late or now_s - looked_s >= _LOOK_PERIOD_S:
+                looked_s = now_s
+                # Whoever is loading or compiling is waited for anew: that takes what it takes.
+                if getting_ready(self):
+                    waited_since_s = now_s
+                elif late:
+                    raise EvaluationError(
+                        f'no {self.diagnostics.waiting_for} within {limit_s:g} s: are the other '
+                        'nodes running, and remapped alike?')
+            self._turn(_SPIN_S)
 
     def _missing(self) -> str:
         """Tell what is not there yet; empty when all is."""
@@ -268,7 +300,3 @@ class BagReplayNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(BagReplayNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

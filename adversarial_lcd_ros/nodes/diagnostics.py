@@ -36,6 +36,8 @@ class Diagnostics:
         Further values, read when a status goes out.
     problems : list of callable
         Each tells what is wrong at the moment, or ''; read when a status goes out.
+    state : str
+        What the node does before it takes messages; empty from then on.
     waiting_for : str
         What the node cannot start without; empty once it is there.
 
@@ -51,7 +53,7 @@ class Diagnostics:
         self._latency_s: deque[float] = deque(maxlen=_KEPT_LATENCIES)
         self.gauges: dict[str, Callable[[], Any]] = {}
         self.problems: list[Callable[[], str]] = []
-        self.waiting_for = ''
+        self.state = self.waiting_for = ''
         self._last_counts: Counter[str] = Counter()
         self._last_s = time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, TOPIC, 10)
@@ -159,7 +161,9 @@ class Diagnostics:
         """Return the level of what happened since the last status, and its line."""
         parts = [f'{new[name]} {name} in the last second' for name in worries]
         parts += filter(None, (problem() for problem in self.problems))
-        if self.waiting_for:
+        if self.state:
+            parts.append(self.state)
+        elif self.waiting_for:
             parts.append(f'waiting for {self.waiting_for}')
         message = '; '.join(parts) or 'ok'
         passed = any(number for name, number in new.items() if name.startswith(_OUTPUT))

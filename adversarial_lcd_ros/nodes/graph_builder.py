@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('graph_builder'))
+
 from array import array
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-import sys
 import time
 from typing import Any
 
@@ -29,6 +33,7 @@ from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import StampWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.preloading import load_for_builder
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.detections import MISSED, DetectionInbox
@@ -70,6 +75,8 @@ class GraphBuilderNode(PipelineNode):
         super().__init__(**options)
         config, node_config, self._limits = self.settings
         self._builder = GraphBuilder(config, node_config.frames_at_once)
+        self.say('compiling')
+        load_for_builder()
         self._frames_at_once = node_config.frames_at_once
         self._under_way: deque[_Frame] = deque()
         # Publishes in this node's own thread what a thread of the network has finished.
@@ -204,7 +211,3 @@ class GraphBuilderNode(PipelineNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(GraphBuilderNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from adversarial_lcd_ros.start import run_node_process
+
+if __name__ == '__main__':  # before the other imports: they take a second, and Ctrl-C may come
+    raise SystemExit(run_node_process('lcd'))
+
 from collections.abc import Sequence
 from dataclasses import replace
-import sys
 import time
 from typing import Any
 
@@ -13,7 +17,6 @@ from std_msgs.msg import UInt8MultiArray
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.nodes.compiled import load_for_detector
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -23,6 +26,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.preloading import load_for_detector
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 
 
@@ -43,6 +47,7 @@ class LcdNode(PipelineNode):
         super().__init__(**options)
         config, node_config, self._limits = self.settings
         self.detector = LoopClosureDetector(config)
+        self.say('compiling')
         load_for_detector(config)
         self._rate = Rate(node_config.max_queries_per_s)
         self._watch = GraphWatch(self.diagnostics)
@@ -112,7 +117,3 @@ class Rate:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_node(LcdNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import importlib
 import importlib.util
+import os
+from pathlib import Path
 import secrets
 import signal
 import sys
@@ -28,11 +30,14 @@ from adversarial_lcd_ros.config import Config
 from adversarial_lcd_ros.errors import AdversarialLcdError, ConfigError
 from adversarial_lcd_ros.nodes import parameters
 from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
+from adversarial_lcd_ros.start import SIGNALS, ignore_signals, interruptible, report
 
 EXIT_OK, EXIT_ERROR, EXIT_USAGE = 0, 1, 2
+NO_LOG_FILES = ['--ros-args', '--disable-external-lib-logs', '--']
+# What a node says once it takes messages.
+READY = 'ready'
 _SPIN_S = 0.1
 _OF_ROS = ('/rosout', '/parameter_events')
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _BAD_ARGUMENTS = (
     rclpy_implementation.RCLError, rclpy_implementation.RCLInvalidROSArgsError,
     rclpy_implementation.UnknownROSArgsError, InvalidNamespaceException,
@@ -85,6 +90,7 @@ class PipelineNode(Node):  # type: ignore[misc]
         self.diagnostics = Diagnostics(self, self.manual.purpose)
         self.session = secrets.randbits(64) or 1
         self.inputs: list[str] = []
+        self.say('loading')
 
     def say_ready(self, about: str, *outputs: str) -> None:
         """
@@ -102,14 +108,20 @@ class PipelineNode(Node):  # type: ignore[misc]
         said = sorted({*map(self.resolve_topic_name, outputs),
                        *(entry.topic_name for entry in self.publishers)} - set(_OF_ROS))
         parameters.check_overridden_topics(self, subscription=heard, publisher=said)
-        self.get_logger().info(f'ready: {about}; hears {", ".join(heard)}; publishes '
-                               f'{", ".join(said)}')
+        self.say(READY, f'{about}; hears {", ".join(heard)}; publishes {", ".join(said)}')
 
     def destroy_node(self) -> None:
         """Log what was counted before the publishers go."""
         if self.context.ok():
             self.get_logger().info(f'end: {self.diagnostics.summary()}')
         super().destroy_node()
+
+    def say(self, state: str, about: str = '') -> None:
+        """Tell how far the start has come: to the log, to /diagnostics, and to a supervisor."""
+        self.get_logger().info(f'{state}: {about}' if about else state)
+        self.diagnostics.state = '' if state == READY else state
+        self.diagnostics.publish()
+        report(state)
 
     def work(self, spin: Callable[[float], bool]) -> int:
         """
@@ -142,41 +154,68 @@ def run_node(node_class: type[PipelineNode], args: Sequence[str] | None = None) 
 
     """
     arguments = list(sys.argv[1:] if args is None else args)
-    stop = Event()
-    with _stopping(stop, restore=args is not None):
-        context = Context()
-        try:
-            _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
-            # rclpy's own handlers shut the context down under a callback that is publishing.
-            rclpy.init(args=arguments, context=context,
-                       signal_handler_options=SignalHandlerOptions.NO)
-            return _live(node_class, context, stop)
-        except SystemExit as end:  # argparse: --help, or an argument that is none
-            return int(end.code or EXIT_OK)
-        except (AdversarialLcdError, *_BAD_ARGUMENTS) as error:
+    own_process = args is None
+    context = Context()
+    if own_process:
+        interruptible(EXIT_OK)
+    try:
+        _parser(node_class).parse_args(remove_ros_args(['', *arguments])[1:])
+        # rclpy's own handlers shut the context down under a callback that is publishing.
+        rclpy.init(args=[*arguments, *_without_log_files(arguments)], context=context,
+                   signal_handler_options=SignalHandlerOptions.NO)
+        return _live(node_class, context, own_process)
+    except KeyboardInterrupt:  # before the node was ready
+        return EXIT_OK
+    except SystemExit as end:  # argparse: --help, or an argument that is none
+        return int(end.code or EXIT_OK)
+    except (AdversarialLcdError, *_BAD_ARGUMENTS) as error:
+        # A supervisor tells it himself, as the last that he says.
+        if not report(f'error {_one_line(error)}'):
             print(f'{node_class.default_name}: {_one_line(error)}', file=sys.stderr)
-            known = isinstance(error, AdversarialLcdError) and not isinstance(error, ConfigError)
-            return EXIT_ERROR if known else EXIT_USAGE
-        finally:
-            _ignore_signals()
-            context.try_shutdown()
+        known = isinstance(error, AdversarialLcdError) and not isinstance(error, ConfigError)
+        return EXIT_ERROR if known else EXIT_USAGE
+    finally:
+        if own_process:
+            ignore_signals()
+        context.try_shutdown()
 
 
-def _live(node_class: type[PipelineNode], context: Context, stop: Event) -> int:
+def _without_log_files(arguments: Sequence[str]) -> list[str]:
+    """Return arguments that keep rclpy from log files where there is no place for them."""
+    if NO_LOG_FILES[1] in arguments:
+        return []
+    chosen, home = os.environ.get('ROS_LOG_DIR'), os.environ.get('ROS_HOME')
+    try:
+        place = Path(chosen or home or '~/.ros').expanduser()
+    except RuntimeError:  # no home
+        place = None
+    # rclpy makes the folder; what must be there, and be open to writing, is a folder above it.
+    while place and not place.exists() and place != place.parent:
+        place = place.parent
+    if place and os.access(place, os.W_OK):
+        return []
+    print('no log files are kept: set ROS_LOG_DIR to a folder that can be written',
+          file=sys.stderr)
+    return NO_LOG_FILES
+
+
+def _live(node_class: type[PipelineNode], context: Context, own_process: bool) -> int:
     node = node_class(context=context)
     executor = make_executor(context, node_class.wakes_itself)
     executor.add_node(node)
-    try:
-        # The nodes of a pipeline share the cores. BLAS threads that wait spinning for a core
-        # another node has cost three times the time (measured: 36 ms a graph in lcd, not 12).
-        with threadpool_limits(1):
-            return node.work(lambda seconds: _spin(executor, stop, seconds))
-    finally:
-        # A second Ctrl-C, or launch's, must not hit what follows.
-        _ignore_signals()
-        node.close()
-        executor.shutdown()
-        node.destroy_node()
+    stop = Event()
+    with _stopping(stop, restore=not own_process):
+        try:
+            # The nodes of a pipeline share the cores. BLAS threads that wait spinning for a core
+            # another node has cost three times the time (measured: 36 ms a graph in lcd, not 12).
+            with threadpool_limits(1):
+                return node.work(lambda seconds: _spin(executor, stop, seconds))
+        finally:
+            # A second Ctrl-C, or launch's, must not hit what follows.
+            ignore_signals()
+            node.close()
+            executor.shutdown()
+            node.destroy_node()
 
 
 def make_executor(context: Context, guard_conditions: bool = False) -> Executor:
@@ -203,18 +242,13 @@ def _spin(executor: Executor, stop: Event, seconds: float) -> bool:
 @contextmanager
 def _stopping(stop: Event, restore: bool) -> Iterator[None]:
     """Turn signals into the event; a process of its own leaves them ignored until it is gone."""
-    before = {number: signal.signal(number, lambda *_: stop.set()) for number in _SIGNALS}
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in SIGNALS}
     try:
         yield
     finally:
         if restore:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-
-def _ignore_signals() -> None:
-    for number in _SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
 
 
 def _one_line(error: Exception) -> str:

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 import os
 from pathlib import Path
-import signal
-import subprocess
-import sys
-import time
 
 import yaml
 
@@ -21,15 +16,20 @@ from adversarial_lcd_ros.codec import (
     decode_graph,
     decode_loop_closure,
 )
+from adversarial_lcd_ros.compiled.caching import code_folder
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.replay.domain import VARIABLE
+from adversarial_lcd_ros.evaluation.replay.supervision import (
+    NodeProcess,
+    Tell,
+    await_end,
+    ended_together,
+)
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.paths import share_path
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
-STOP_TIMEOUT_S = 15.0
-POLL_S = 0.1
-LOG_TAIL_LINES = 8
+RECORDING = 'recording'
 _MAN_IN_THE_MIDDLE = ('-r', 'graph:=graph_clean')
 
 
@@ -69,7 +69,8 @@ class Recording:
     reports: list[AttackReport]
 
 
-def run_pipeline(bag: Path, setup: Setup, folder: Path) -> Recording:
+def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
+                 tell: Tell = lambda text: None) -> Recording:
     """
     Replay a bag through real processes and return what was recorded.
 
@@ -80,30 +81,39 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path) -> Recording:
     setup : Setup
     folder : Path
         New folder; gets the recording, the parameters and a log of every node.
+    domain : int
+        ROS domain, from ``own_domain``.
+    tell : callable
+        Gets a line of text now and then, while nodes get ready.
 
     Raises
     ------
     EvaluationError
-        A node ends early or fails; the tail of its log is in the message.
+        A node ends early or fails; what it said is in the message.
 
     """
     folder.mkdir(parents=True)
     parameters = folder / 'parameters.yaml'
-    parameters.write_text(yaml.safe_dump(_parameters(bag, setup, folder / 'recording')),
+    parameters.write_text(yaml.safe_dump(_parameters(bag, setup, folder / RECORDING)),
                           encoding='utf-8')
-    nodes: list[tuple[str, Sequence[str]]] = [('lcd', ())]
+    nodes: dict[str, Sequence[str]] = {'lcd': ()}
     if setup.builder:
-        nodes.append(('graph_builder', _MAN_IN_THE_MIDDLE if setup.attack else ()))
+        nodes['graph_builder'] = _MAN_IN_THE_MIDDLE if setup.attack else ()
     if setup.attack:
-        nodes.append(('attacker', ()))
-    with ExitStack() as stack:
-        running = {name: stack.enter_context(_node(name, parameters, arguments, folder))
-                   for name, arguments in nodes}
-        # Its progress goes to the terminal.
-        replay = stack.enter_context(
-            _node('bag_replay', parameters, (), folder, keep_stderr=True))
-        _await_end(replay, running, folder)
-    return _read(folder / 'recording', attacked=setup.attack is not None)
+        nodes['attacker'] = ()
+    # Its progress goes to the terminal; what it logs while it starts is of no use there.
+    nodes['bag_replay'] = ('--log-level', 'warn')
+    running: list[NodeProcess] = []
+    with ended_together(running):
+        for name, remaps in nodes.items():
+            running.append(NodeProcess(
+                # What they log is kept with the run, and not below the user's home.
+                name, ['--ros-args', '--disable-external-lib-logs', '--params-file',
+                       str(parameters), *remaps],
+                node_environment(domain, folder.parent / 'compiled'), folder / f'{name}.log',
+                keep_stderr=name == 'bag_replay'))
+        await_end(running[-1], running[:-1], tell)
+    return read_recording(folder, attacked=setup.attack is not None)
 
 
 def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
@@ -117,58 +127,29 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
-def node_environment() -> Mapping[str, str]:
-    """Return the environment of the nodes: on this machine only, in a domain of their own."""
-    return {**os.environ,
+def node_environment(domain: int, spare: Path | None = None) -> Mapping[str, str]:
+    """
+    Return the environment of the nodes: on this machine only, in a domain of their own.
+
+    Parameters
+    ----------
+    domain : int
+    spare : Path, optional
+        Folder for compiled code where it can be kept nowhere else.
+
+    """
+    kept = {'NUMBA_CACHE_DIR': str(spare.resolve())} if spare and code_folder() is None else {}
+    return {**os.environ, **kept,
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
+            VARIABLE: str(domain),
             'FASTRTPS_DEFAULT_PROFILES_FILE': str(share_path('config/fastdds.xml')),
             # Three processes share the cores; their small matrices gain nothing from threads.
             'OMP_NUM_THREADS': '1', 'OPENBLAS_NUM_THREADS': '1'}
 
 
-@contextmanager
-def _node(name: str, parameters: Path, arguments: Sequence[str], folder: Path,
-          keep_stderr: bool = False) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a node; on the way out, interrupt it and see it end."""
-    command = [sys.executable, '-m', f'adversarial_lcd_ros.nodes.{name}', '--ros-args',
-               '--params-file', str(parameters), *arguments]
-    with (folder / f'{name}.log').open('wb') as log:
-        process = subprocess.Popen(command, env=node_environment(), stdout=log,
-                                   start_new_session=True,
-                                   stderr=None if keep_stderr else subprocess.STDOUT)
-        try:
-            yield process
-        finally:
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-    if process.returncode:
-        raise EvaluationError(_failure(name, process.returncode, folder))
-
-
-def _await_end(replay: subprocess.Popen[bytes], running: Mapping[str, subprocess.Popen[bytes]],
-               folder: Path) -> None:
-    """Wait until the replay is over, while every node lives."""
-    while replay.poll() is None:
-        for name, process in running.items():
-            if process.poll() is not None:
-                raise EvaluationError(_failure(name, process.returncode, folder))
-        time.sleep(POLL_S)
-
-
-def _failure(name: str, code: int, folder: Path) -> str:
-    log = folder / f'{name}.log'
-    tail = log.read_text(encoding='utf-8', errors='replace').splitlines()[-LOG_TAIL_LINES:]
-    said = ' | '.join(line.strip() for line in tail if line.strip())
-    return f'node {name} ended with exit code {code}: {said or "it said nothing"} (log: {log})'
-
-
-def _read(recording: Path, attacked: bool) -> Recording:
+def read_recording(folder: Path, attacked: bool) -> Recording:
+    """Return what ``run_pipeline`` recorded in a folder; raises SequenceError, CodecError."""
+    recording = folder / RECORDING
     forwarded = [decode_graph(payload) for _, payload in read_payloads(recording, 'graph')]
     decisions = [decode_loop_closure(payload)
                  for _, payload in read_payloads(recording, 'loop_closures')]

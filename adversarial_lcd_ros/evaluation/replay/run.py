@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 import shutil
@@ -16,10 +17,17 @@ from adversarial_lcd_ros.config import (
     LcdConfig,
     ReplayConfig,
 )
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
 from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
-from adversarial_lcd_ros.evaluation.replay.processes import Recording, Setup, run_pipeline
+from adversarial_lcd_ros.evaluation.replay.processes import (
+    RECORDING,
+    Recording,
+    Setup,
+    read_recording,
+    run_pipeline,
+)
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     AttackRun,
@@ -29,6 +37,13 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
+from adversarial_lcd_ros.evaluation.replay.unfinished import (
+    RECORDINGS,
+    finished_in_s,
+    mark_finished,
+    plan_digest,
+    results_folder,
+)
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
@@ -43,8 +58,6 @@ from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.replay import Replay
-
-RECORDINGS = 'recordings'
 
 
 @dataclass(frozen=True)
@@ -92,7 +105,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         "adversarial-lcd build" does: these are used as they are, whatever the settings of the
         builder. Without ground truth no decision is scored, and what changes is counted.
     output : Path
-        Folder in which the results folder is made.
+        Folder in which the results folder is made; an unfinished one of the same plan that is
+        there is gone on with.
     plan : Plan
     command_line : sequence of str
         Kept with the results.
@@ -115,32 +129,59 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         if plan.sweep_labels:
             raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
         tell('no ground truth: decisions that change are counted, none can be scored')
-    plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1))
-    frames = Replay(bag, plan.replay).frame_count
     target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
-    folder = ResultsFolder.create(output)
-    runs = _replay(bag, sequence, plan, frames, folder.path / RECORDINGS, tell)
-    tell('labels, figures and pictures')
-    clean = runs.pop(CLEAN)
+    # Whether the nodes still live is watched here: the replay waits for them without a limit.
+    plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1, start_timeout_s=0.0))
+    digest = plan_digest(bag, {'builder': plan.builder, 'lcd': plan.lcd, 'replay': plan.replay,
+                               **{f'attack {name}': attack
+                                  for name, attack in plan.attacks.items()}}, plan.rebuild)
+    with own_domain() as domain, results_folder(output, digest) as folder:
+        tell(f'ROS domain {domain}')
+        with _kept(folder.path, tell):
+            runs, earlier_s = Replays(bag, sequence, plan, folder.path / RECORDINGS, domain,
+                                      tell).run()
+        tell('labels, figures and pictures')
+        clean = runs.pop(CLEAN)
+        records, summary = _figures(sequence, clean, runs, plan)
+        if plan.sweep_labels:
+            write_sweep(folder.path / SWEEP, summary['label_sweep'])
+        summary['duration_s'] = earlier_s + time.monotonic() - started_s
+        _write(folder, plan, summary, records, command_line, domain,
+               telling_pictures(sequence, clean, runs, records, summary))
+        if not keep_recordings:
+            shutil.rmtree(folder.path / RECORDINGS)
+        return folder.finish(), summary
+
+
+def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
+             runs: Mapping[str, Recording], plan: Plan
+             ) -> tuple[list[QueryRecord], dict[str, Any]]:
+    """Return the records of all runs, and what they come to."""
     labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
-        [graph.node_count for graph in clean.clean], [graph.edge_count for graph in clean.clean]),
-        plan.seed)
+        [graph.node_count for graph in clean.clean],
+        [graph.edge_count for graph in clean.clean]), plan.seed)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:
-        tell('labels with other thresholds')
         summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
                                               plan.labels)
-        write_sweep(folder.path / SWEEP, summary['label_sweep'])
-    summary['duration_s'] = time.monotonic() - started_s
-    _write(folder, plan, summary, records, command_line,
-           telling_pictures(sequence, clean, runs, records, summary))
-    if not keep_recordings:
-        shutil.rmtree(folder.path / RECORDINGS)
-    return folder.finish(), summary
+    return records, summary
+
+
+@contextmanager
+def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
+    """Say what is kept of an evaluation that ends early."""
+    try:
+        yield
+    except (AdversarialLcdError, KeyboardInterrupt):
+        finished = sum(finished_in_s(run) is not None
+                       for run in (folder / RECORDINGS).iterdir() if run.is_dir())
+        tell(f'{finished} finished runs are kept in {folder}; the same command goes on from '
+             'there, "adversarial-lcd clean" clears it away')
+        raise
 
 
 def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
@@ -158,29 +199,73 @@ def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan
     return replace(plan, builder=None)
 
 
-def _replay(bag: Path, sequence: CameraSequence | GraphSequence, plan: Plan, frames: int,
-            folder: Path, tell: Callable[[str], None]) -> dict[str, Recording]:
-    """Replay the bag clean and under every attack; return the recordings by name of the run."""
-    runs: dict[str, Recording] = {}
-    for number, (name, attack) in enumerate([(CLEAN, None), *plan.attacks.items()]):
-        from_bag = plan.rebuild or number < 2
-        tell(f'run {number + 1} of {len(plan.attacks) + 1}: {name}'
-             + ('' if from_bag else ' (from the graphs of run 2)'))
-        setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
-        source = bag
-        if isinstance(sequence, GraphSequence) and from_bag:
-            # Where the graphs enter the pipeline depends on whether somebody is in the middle.
-            source = folder / f'graphs_{number}'
-            with BagWriter(source) as copy:
-                write_graphs(copy, sequence, CLEAN_TOPIC if attack else GRAPH_TOPIC)
+class Replays:
+    """
+    A bag replayed clean and under every attack, in one ROS domain.
+
+    Parameters
+    ----------
+    bag : Path
+    sequence : CameraSequence or GraphSequence
+        What is in it.
+    plan : Plan
+    folder : Path
+        For the recordings; those of finished runs that are there are read, not made again.
+    domain : int
+    tell : callable
+        Gets a line of text for each run.
+
+    """
+
+    def __init__(self, bag: Path, sequence: CameraSequence | GraphSequence, plan: Plan,
+                 folder: Path, domain: int, tell: Callable[[str], None]) -> None:
+        self._bag, self._sequence, self._plan = bag, sequence, plan
+        self._folder, self._domain, self._tell = folder, domain, tell
+        self._frames = Replay(bag, plan.replay).frame_count
+
+    def run(self) -> tuple[dict[str, Recording], float]:
+        """Return the recordings by name of the run, and how long the earlier ones took."""
+        runs: dict[str, Recording] = {}
+        earlier_s = 0.0
+        for number, (name, attack) in enumerate([(CLEAN, None), *self._plan.attacks.items()]):
+            from_bag = self._plan.rebuild or number < 2
+            title = (f'run {number + 1} of {len(self._plan.attacks) + 1}: {name}'
+                     + ('' if from_bag else ' (from the graphs of run 2)'))
+            folder = self._folder / f'{number}'
+            spent_s = finished_in_s(folder)
+            if spent_s is not None:
+                self._tell(f'{title}: finished earlier')
+                earlier_s += spent_s
+                runs[name] = read_recording(folder, attacked=attack is not None)
+                continue
+            self._tell(title)
+            began_s = time.monotonic()
+            shutil.rmtree(folder, ignore_errors=True)
+            source, setup = self._source(number, attack, from_bag)
+            runs[name] = run_pipeline(source, setup, folder, self._domain, self._tell)
+            _check(name, runs[name], self._frames)
+            mark_finished(folder, time.monotonic() - began_s)
+        return runs, earlier_s
+
+    def _source(self, number: int, attack: AttackConfig | None,
+                from_bag: bool) -> tuple[Path, Setup]:
+        """Return the bag of a run and the settings of its nodes."""
+        plan = self._plan
         if not from_bag:
             # The recording holds the chosen frames only: nothing is to be skipped again.
-            replay = ReplayConfig(lockstep=True, window=plan.replay.window,
-                                  timeout_s=plan.replay.timeout_s, clock=plan.replay.clock)
-            source, setup = folder / '1' / 'recording', Setup(None, plan.lcd, replay, attack)
-        runs[name] = run_pipeline(source, setup, folder / f'{number}')
-        _check(name, runs[name], frames)
-    return runs
+            every = ReplayConfig()
+            replay = replace(plan.replay, start_s=every.start_s, duration_s=every.duration_s,
+                             stride=every.stride)
+            return self._folder / '1' / RECORDING, Setup(None, plan.lcd, replay, attack)
+        setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
+        if not isinstance(self._sequence, GraphSequence):
+            return self._bag, setup
+        # Where the graphs enter the pipeline depends on whether somebody is in the middle.
+        source = self._folder / f'graphs_{number}'
+        shutil.rmtree(source, ignore_errors=True)
+        with BagWriter(source) as copy:
+            write_graphs(copy, self._sequence, CLEAN_TOPIC if attack else GRAPH_TOPIC)
+        return source, setup
 
 
 def _check(name: str, run: Recording, frames: int) -> None:
@@ -205,8 +290,9 @@ def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]
 
 
 def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
-           records: Sequence[QueryRecord], command_line: Sequence[str],
+           records: Sequence[QueryRecord], command_line: Sequence[str], domain: int,
            pictures: Sequence[Picture]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
-    folder.write_setup([section for section in sections if section], command_line, plan.seed)
+    folder.write_setup([section for section in sections if section], command_line, plan.seed,
+                       {'ros_domain_id': domain})
     write_results(folder, summary, records, pictures)

@@ -6,7 +6,7 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 
-compiled = pytest.importorskip('adversarial_lcd_ros.nodes.compiled')
+compiled = pytest.importorskip('adversarial_lcd_ros.preloading')
 
 
 @pytest.mark.parametrize('target', ['wl', 'anchored', 'objects', 'vbow'])
@@ -20,17 +20,17 @@ def test_a_graph_is_compared(monkeypatch, target):
     assert all(decision.probability > 0 for decision in judged)
 
 
-@pytest.mark.parametrize(('perturbation', 'surrogate', 'mode'), [
-    ('eigencentrality', 'svm_rbf', 'query'), ('eigencentrality', 'svm_rbf', 'surrogate'),
-    ('random_walk', 'ard', 'query'), ('recall', 'none', 'query'), ('recall', 'none', 'surrogate'),
-    ('eigencentrality', 'none', 'pass')])
-def test_a_graph_is_attacked(monkeypatch, perturbation, surrogate, mode):
+@pytest.mark.parametrize(('attack', 'mode'), [
+    ({'surrogate': 'svm_rbf'}, 'query'), ({'surrogate': 'svm_rbf'}, 'surrogate'),
+    ({'perturbation': 'random_walk', 'surrogate': 'ard'}, 'query'),
+    ({'search': 'recall'}, 'query'), ({'search': 'recall'}, 'surrogate'),
+    ({'surrogate': 'none'}, 'pass')])
+def test_a_graph_is_attacked(monkeypatch, attack, mode):
     results = []
     process = Attacker.process
     monkeypatch.setattr(Attacker, 'process', lambda self, graph, ask: results.append(
         process(self, graph, ask)) or results[-1])
-    compiled.load_for_attacker(AttackConfig(perturbation=perturbation, surrogate=surrogate,
-                                            mode=mode, deadline_ms=1.0))
+    compiled.load_for_attacker(AttackConfig(mode=mode, deadline_ms=1.0, **attack))
     last = results[-1]
     assert last.edit_budget == 1
     assert last.reason == {'pass': 'mode is pass', 'surrogate': 'nobody asked'}.get(
