@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import csv
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -11,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import FileError, SequenceError
+from adversarial_lcd_ros.files.reading import csv_rows
 from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
 
 DETECTIONS_FILE = 'detections.csv'
@@ -89,13 +89,13 @@ def read_detections(path: Path) -> DetectionTable:
 
 def _rows(path: Path) -> Iterator[tuple[int, int, float, float, float, float, float]]:
     try:
-        with path.open(encoding='utf-8', newline='') as file:
-            lines = csv.reader(file, strict=True)
-            _check_header(path, next(lines, []))
-            for fields in lines:
-                yield _row(f'{path}, line {lines.line_num}', fields)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise SequenceError(f'{path} cannot be read as CSV: {error}') from error
+        lines = csv_rows(path)
+        _, header = next(lines, (0, []))
+        _check_header(path, header)
+        for number, fields in lines:
+            yield _row(f'{path}, line {number}', fields)
+    except FileError as error:
+        raise SequenceError(str(error)) from error
 
 
 def _check_header(path: Path, header: list[str]) -> None:

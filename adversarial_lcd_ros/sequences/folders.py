@@ -9,7 +9,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import FileError, SequenceError
+from adversarial_lcd_ros.files.reading import MIB, read_bytes
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame, open_compressed
 from adversarial_lcd_ros.sequences.frame_poses import image_poses, read_poses
@@ -32,6 +33,7 @@ DEFAULT_RATE_HZ = 30.0
 WALK_GAP_S = 60.0
 _SUFFIXES = ('.jpg', '.jpeg', '.png')
 _SEVEN_SCENES_COLOUR = '.color.png'
+MAX_PICTURE_BYTES = 128 * MIB
 
 
 def images_in(folder: Path) -> list[Path]:
@@ -173,7 +175,7 @@ def _sequence(folder: Path, paths: list[Path], stamps: list[int] | NDArray[np.in
 
 def _open(path: Path, stamp_ns: int, size: tuple[int, int] | None) -> Frame:
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SequenceError(f'image {path} cannot be read: {error}') from error
+        data = read_bytes(path, MAX_PICTURE_BYTES)
+    except FileError as error:
+        raise SequenceError(f'image {error}') from error
     return open_compressed(stamp_ns, data, f'image {path}', size)
