@@ -22,8 +22,10 @@ INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
 NODES := attacker bag_replay graph_builder lcd
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-# Every release by its digest, and nothing that has to be built; the lock is complete.
-LOCKED := $(PIP) install --no-deps --require-hashes --only-binary=:all:
+# Every release by its digest, from a lock that is complete. What comes as source is built by what
+# is in the lock, too.
+LOCKED := $(PIP) install --no-deps --require-hashes --no-build-isolation -r
+PART := $(BIN)/python requirements/part.py
 
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -66,7 +68,7 @@ soak: model
 
 # make lock ARGS=--upgrade takes the newest releases; without it, what setup.cfg asks for anew.
 lock: $(INSTALLED)
-	@$(LOCKED) -r requirements/uv.txt
+	@$(LOCKED) requirements/uv.txt
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python requirements/lock.py $(ARGS)
 
 licences: $(BENCHABLE)
@@ -80,7 +82,7 @@ model: $(INSTALLED)
 # With ROS 2 sourced its own rclpy is used; otherwise PyPI's wheels of ROS 2 Jazzy are.
 # The links are what "pip install ." and colcon make: executables where "ros2 run" looks.
 $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requirements/ros.txt \
-    requirements/missing.py
+    requirements/part.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
 	  { echo 'error: $(PYTHON) is older than Python 3.10; make PYTHON=python3.12' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
@@ -90,9 +92,11 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	@if $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	  $(PYTHON) -m venv --system-site-packages $(VENV); else $(PYTHON) -m venv $(VENV); fi
 	@if $(BIN)/python -c 'import rclpy' 2>/dev/null; then \
-	  $(BIN)/python requirements/missing.py requirements/test.txt > $(VENV)/lock.txt; \
+	  $(PART) requirements/test.txt > $(VENV)/lock.txt; \
 	  else cp requirements/ros.txt $(VENV)/lock.txt; fi
-	@$(LOCKED) -r $(VENV)/lock.txt
+	@$(PART) requirements/test.txt --only setuptools > $(VENV)/build.txt
+	@$(LOCKED) $(VENV)/build.txt
+	@$(LOCKED) $(VENV)/lock.txt
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
 	@for node in $(NODES); do \
@@ -100,8 +104,8 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	@touch $@
 
 $(BENCHABLE): $(INSTALLED) requirements/bench.txt
-	@$(BIN)/python requirements/missing.py requirements/bench.txt > $(VENV)/bench.txt
-	@$(LOCKED) -r $(VENV)/bench.txt
+	@$(PART) requirements/bench.txt > $(VENV)/bench.txt
+	@$(LOCKED) $(VENV)/bench.txt
 	@touch $@
 
 clean:
