@@ -15,8 +15,9 @@ HERE = Path(__file__).resolve().parent
 _HEAD = """\
 # Licences
 
-What `make setup` and `make bench` install, and under which terms: as each distribution says of itself. Made by
-`make licences`; what the lock names for other Pythons or systems is not in it. Nothing of it ships with this package.
+What `make setup` and `make bench` install, and under which terms, as each distribution says of
+itself. Made by `make licences`; what the lock names for other Pythons or systems is not in it.
+Nothing of it ships with this package.
 
 | distribution | version | licence |
 |---|---|---|"""

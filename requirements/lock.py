@@ -32,7 +32,7 @@ Lock = dict[tuple[str, str], tuple[str, frozenset[str]]]
 
 
 def parse(text: str) -> Lock:
-    """Return what a lock file says; raises ValueError for a line that is neither pin nor digest."""
+    """Return what a lock file says; raises ValueError for a line that is none of it."""
     found: Lock = {}
     key = ('', '')
     for line in text.splitlines():
