@@ -90,8 +90,8 @@ CARD = {'format': FORMAT, 'target': 'wl', 'channels': list(TARGETS['wl'].channel
 @pytest.mark.parametrize(('change', 'message'), [
     ({'bias': float('nan')}, 'NaN is no number'),
     ({'bias': 10**400}, 'too large'),
-    ({'bias': 1e308}, 'expected 3 weights and a bias, from'),
-    ({'weights': []}, 'expected 3 weights'),
+    ({'bias': 1e308}, 'expected 3 finite weights and a bias, from'),
+    ({'weights': []}, 'expected 3 finite weights'),
     ({'weights': None}, 'no trained decision'),
     ({'target': 'vbow'}, 'was trained for target vbow'),
     ({'card': 3}, 'no trained decision'),

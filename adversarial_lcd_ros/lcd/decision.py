@@ -86,10 +86,9 @@ class Decision:
                            tuple(float(weight) for weight in text['weights']),
                            float(text['bias']), dict(text.get('card', {})))
             kind = text['format']
-        except FileError as error:
-            raise ModelError(f'{error}; train one with "adversarial-lcd train"') from error
-        except (ValueError, TypeError, KeyError, OverflowError) as error:
-            raise ModelError(f'{path} is no trained decision: {error!r}; train one with '
+        except (FileError, ValueError, TypeError, KeyError, OverflowError) as error:
+            detail = error if isinstance(error, FileError) else repr(error)
+            raise ModelError(f'{path} is no trained decision: {detail}; train one with '
                              '"adversarial-lcd train"') from error
         if kind != FORMAT:
             raise ModelError(f'{path} has format {kind!r}: expected {FORMAT!r}')
@@ -98,7 +97,7 @@ class Decision:
                              f'{decision.channels}: expected {target} {channels}')
         if len(decision.weights) != len(channels) or not all(
                 abs(value) <= _MAX_WEIGHT for value in (*decision.weights, decision.bias)):
-            raise ModelError(f'{path}: expected {len(channels)} weights and a bias, from '
+            raise ModelError(f'{path}: expected {len(channels)} finite weights and a bias, from '
                              f'-{_MAX_WEIGHT:g} to {_MAX_WEIGHT:g}, found {decision.weights} and '
                              f'{decision.bias}')
         return decision

@@ -70,8 +70,8 @@ class GnnTarget(Target):
         try:
             self._session = open_network(path, threads=1)
         except FileError as error:
-            raise ModelError(f'{error}; train one with "adversarial-lcd train --targets gnn"'
-                             ) from error
+            raise ModelError(f'{path} is no network: {error}; train one with "adversarial-lcd '
+                             'train --targets gnn"') from error
         names = tuple(entry.name for entry in self._session.get_inputs())
         if names != INPUTS or [entry.name for entry in self._session.get_outputs()] != [OUTPUT]:
             raise ModelError(f'{path} has inputs {names}: expected {INPUTS} and the output '
