@@ -22,10 +22,9 @@ INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
 NODES := attacker bag_replay graph_builder lcd
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-# Every release by its digest, from a lock that is complete. What comes as source is built by what
-# is in the lock, too.
+# Every release by its digest, from a lock that is complete. What comes as source is built by the
+# setuptools of the lock, too.
 LOCKED := $(PIP) install --no-deps --require-hashes --no-build-isolation -r
-PART := $(BIN)/python requirements/part.py
 
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -91,12 +90,10 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	@rm -rf $(VENV)
 	@if $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	  $(PYTHON) -m venv --system-site-packages $(VENV); else $(PYTHON) -m venv $(VENV); fi
-	@if $(BIN)/python -c 'import rclpy' 2>/dev/null; then \
-	  $(PART) requirements/test.txt > $(VENV)/lock.txt; \
-	  else cp requirements/ros.txt $(VENV)/lock.txt; fi
-	@$(PART) requirements/test.txt --only setuptools > $(VENV)/build.txt
+	@$(BIN)/python requirements/part.py requirements/test.txt setuptools > $(VENV)/build.txt
 	@$(LOCKED) $(VENV)/build.txt
-	@$(LOCKED) $(VENV)/lock.txt
+	@lock=test; $(BIN)/python -c 'import rclpy' 2>/dev/null || lock=ros; \
+	  $(LOCKED) requirements/$$lock.txt
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
 	@for node in $(NODES); do \
@@ -104,8 +101,7 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	@touch $@
 
 $(BENCHABLE): $(INSTALLED) requirements/bench.txt
-	@$(PART) requirements/bench.txt > $(VENV)/bench.txt
-	@$(LOCKED) $(VENV)/bench.txt
+	@$(LOCKED) requirements/bench.txt
 	@touch $@
 
 clean:
