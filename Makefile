@@ -63,7 +63,7 @@ bench: model $(BENCHABLE)
 	$(BIN)/python -m pytest benchmarks $(ARGS)
 
 soak: model
-	$(BIN)/python -m pytest soak $(ARGS)
+	$(BIN)/python -m soak $(ARGS)
 
 # make lock ARGS=--upgrade takes the newest releases; without it, what setup.cfg asks for anew.
 lock: $(INSTALLED)
