@@ -13,7 +13,7 @@ from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, CodecError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
-from adversarial_lcd_ros.evaluation.recipes import load_recipe
+from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.records import read_records
 from adversarial_lcd_ros.evaluation.store import read_cells
 from adversarial_lcd_ros.files.reading import read_json
