@@ -25,10 +25,11 @@ _HEAD = """\
 
 What is promised under faults, and what came of it, by `make soak` (an hour at scale 1; `make test`
 runs a short form). Version {version}, Python {python}, {cores} cores, {minutes:.0f} minutes, scale
-{scale:g} of all counts and times, {date}.
+{scale:g} of all counts and times, {date}; load of the machine at the end: {load:.0f}.
 
 Memory: slope of the resident size over the later three quarters of a run, with the 95 % interval
-of a straight line through up to sixty samples.
+of a straight line through up to sixty samples. A stream of graphs fills the 300 keyframes that
+its detector may remember before memory can be flat.
 
 | fault | promise | tried | outcome | broken | note |
 |---|---|---|---|---|---|
@@ -102,6 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(rows[-1], file=sys.stderr, flush=True)
     head = _HEAD.format(version=__version__, python=platform.python_version(),
                         cores=os.cpu_count(), scale=options.scale,
+                        load=os.getloadavg()[2],
                         minutes=(time.monotonic() - began) / 60, date=time.strftime('%Y-%m-%d'))
     options.output.write_text(head + '\n'.join(rows) + '\n', encoding='utf-8')
     return 1 if broken else 0
