@@ -45,8 +45,8 @@ BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
     ('[' * 100_000, 'nested deeper'),
     ('[' * 40 + ']' * 40, f'nested deeper than {MAX_DEPTH}'),
     ('[' + '9' * 5000 + ']', '4300 digits'),
-    ('hello', 'expected JSON'),
-    ('', 'expected JSON'),
+    ('hello', 'cannot be read as JSON'),
+    ('', 'cannot be read as JSON'),
 ])
 def test_json_that_is_none_is_one_error(tmp_path, text, message):
     path = tmp_path / 'x.json'

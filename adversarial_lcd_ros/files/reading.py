@@ -92,7 +92,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
     except RecursionError as error:
         raise FileError(f'{where} is nested deeper than {MAX_DEPTH}') from error
     except ValueError as error:
-        raise FileError(f'{where}: {error}; expected JSON') from error
+        raise FileError(f'{where} cannot be read as JSON: {error}') from error
     return value
 
 
