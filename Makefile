@@ -2,8 +2,11 @@
 # make paper: the paper's experiments over the sequences in DATA; report in results/paper
 # make target: the detectors before any attack, on the sequences in DATA; tables in results/target
 # make test, make lint, make bench, make clean
+# make soak: an hour of faults; docs/reliability.md tells what came of it
+# make lock, make licences: renew requirements/ and docs/licences.md
 #
-# The first target sets up .venv and the object model; after that nothing is downloaded or built.
+# The first target sets up .venv (releases and digests: requirements/) and the object model; after
+# that nothing is downloaded or built.
 # ARGS are passed on: make demo ARGS='--ratio 1e-4'; make test ARGS='-k codec'
 
 PYTHON ?= python3
@@ -20,11 +23,14 @@ BENCHABLE := $(VENV)/.benchable
 COMPILED := $(VENV)/.compiled
 NODES := attacker bag_replay graph_builder lcd
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
+# Every release by its digest, from a lock that is complete. What comes as source is built by the
+# setuptools of the lock, too.
+LOCKED := $(PIP) install --no-deps --require-hashes --no-build-isolation -r
 
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo paper target test lint bench clean setup model
+.PHONY: demo paper target test lint bench soak lock licences clean setup model
 .DEFAULT_GOAL := demo
 
 demo: model
@@ -57,6 +63,17 @@ lint: $(INSTALLED)
 bench: model $(BENCHABLE)
 	$(BIN)/python -m pytest benchmarks $(ARGS)
 
+soak: model
+	$(BIN)/python -m soak $(ARGS)
+
+# make lock ARGS=--upgrade takes the newest releases; without it, what setup.cfg asks for anew.
+lock: $(INSTALLED)
+	@$(LOCKED) requirements/uv.txt
+	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python requirements/lock.py $(ARGS)
+
+licences: $(BENCHABLE)
+	$(BIN)/python requirements/licences.py > docs/licences.md
+
 setup: model
 
 model: $(INSTALLED) $(COMPILED)
@@ -70,7 +87,8 @@ $(COMPILED): $(INSTALLED)
 
 # With ROS 2 sourced its own rclpy is used; otherwise PyPI's wheels of ROS 2 Jazzy are.
 # The links are what "pip install ." and colcon make: executables where "ros2 run" looks.
-$(INSTALLED): setup.py setup.cfg pyproject.toml
+$(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requirements/ros.txt \
+    requirements/part.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
 	  { echo 'error: $(PYTHON) is older than Python 3.10; make PYTHON=python3.12' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
@@ -79,15 +97,18 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml
 	@rm -rf $(VENV)
 	@if $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	  $(PYTHON) -m venv --system-site-packages $(VENV); else $(PYTHON) -m venv $(VENV); fi
-	@extras=test,dev; $(BIN)/python -c 'import rclpy' 2>/dev/null || extras=ros,$$extras; \
-	  $(PIP) install -e ".[$$extras]"
+	@$(BIN)/python requirements/part.py requirements/test.txt setuptools > $(VENV)/build.txt
+	@$(LOCKED) $(VENV)/build.txt
+	@lock=test; $(BIN)/python -c 'import rclpy' 2>/dev/null || lock=ros; \
+	  $(LOCKED) requirements/$$lock.txt
+	@$(PIP) install --no-deps --no-build-isolation -e .
 	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
 	@for node in $(NODES); do \
 	  ln -sf ../../bin/$$node $(VENV)/lib/adversarial_lcd_ros/$$node; done
 	@touch $@
 
-$(BENCHABLE): $(INSTALLED)
-	@$(PIP) install -e '.[bench]'
+$(BENCHABLE): $(INSTALLED) requirements/bench.txt
+	@$(LOCKED) requirements/bench.txt
 	@touch $@
 
 clean:

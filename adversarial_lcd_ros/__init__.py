@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences import open_sequence
     from adversarial_lcd_ros.vision.builder import GraphBuilder
 
+import os
+
+# onnxruntime from 1.32 on reports to its vendor unless told not to before it is imported. This
+# package is what every process of ours, also a worker's, imports first.
+os.environ['ORT_DISABLE_TELEMETRY'] = '1'
+
 __version__ = '0.1.0'
 
 _HOME = {

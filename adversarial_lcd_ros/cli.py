@@ -7,6 +7,7 @@ What signals mean is settled before anything is imported that costs time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import os
 import signal
 import sys
 
@@ -14,6 +15,7 @@ from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.start import ignore_signals, interruptible, write_plainly
 
 EXIT_OK, EXIT_ERROR, EXIT_INTERRUPTED = 0, 2, 130
+_MAX_ERROR = 1500
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,10 +57,28 @@ def _run(argv: Sequence[str] | None) -> int:
     options = make_parser().parse_args(argv)
     try:
         options.run(options)
+        sys.stdout.flush()  # here, where a full disk can still be said
     except AdversarialLcdError as error:
-        print(f'error: {" ".join(str(error).split())}', file=sys.stderr)
+        return _refuse(str(error))
+    except BrokenPipeError:
+        # Whoever read our output has enough of it; nothing more can be written, also at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_ERROR
+    except OSError as error:
+        return _refuse(f'{error}; what was finished before is kept')
+    except MemoryError:
+        return _refuse('there is not enough memory for this: give it less, or run it elsewhere')
     return EXIT_OK
+
+
+def _refuse(reason: str) -> int:
+    # What is wrong with an input may quote it: not at any length, nor with control characters.
+    line = ' '.join(reason.split())
+    line = line if len(line) <= _MAX_ERROR else f'{line[:_MAX_ERROR]} ...'
+    shown = ''.join(character if character.isprintable() else ascii(character)[1:-1]
+                    for character in line)
+    print(f'error: {shown}', file=sys.stderr)
+    return EXIT_ERROR
 
 
 if __name__ == '__main__':

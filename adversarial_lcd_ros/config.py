@@ -65,7 +65,7 @@ class Config:
 
         """
         known = {entry.name: entry for entry in fields(cls)}
-        unknown = sorted(set(values) - set(known))
+        unknown = sorted(str(name) for name in values if name not in known)
         if unknown:
             raise ConfigError(f'unknown setting {", ".join(unknown)} for {cls.__name__}; '
                               f'there are: {", ".join(known)}')

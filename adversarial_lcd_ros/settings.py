@@ -31,7 +31,8 @@ from adversarial_lcd_ros.config import (
     MessageLimits,
     ReplayConfig,
 )
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, FileError
+from adversarial_lcd_ros.files.reading import read_yaml
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.registry import Table
 
@@ -108,9 +109,9 @@ def load_settings(path: Path) -> dict[str, dict[str, Any]]:
 
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8')) or {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f'settings file {path}: {" ".join(str(error).split())}') from error
+        content = read_yaml(path) or {}
+    except FileError as error:
+        raise ConfigError(f'settings file {error}') from error
     if not isinstance(content, dict):
         raise ConfigError(f'settings file {path}: expected sections, found '
                           f'{type(content).__name__}')

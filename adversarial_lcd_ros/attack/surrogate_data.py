@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.surrogates import Surrogate
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.files.writing import replacing
 from adversarial_lcd_ros.paths import SURROGATE_DATA, model_path
+
+# A support vector machine takes the square of its rows, in time and memory.
+_MAX_ROWS = 20_000
 
 
 def data_path(config: AttackConfig) -> Path:
@@ -74,20 +78,31 @@ class SurrogateData:
 
     def save(self, path: Path) -> None:
         """Write the arrays as compressed npz."""
-        np.savez_compressed(path, **{entry.name: getattr(self, entry.name)
-                                     for entry in fields(self)})
+        with replacing(path) as stream:
+            np.savez_compressed(stream, **{entry.name: getattr(self, entry.name)
+                                           for entry in fields(self)})
 
     @classmethod
     def load(cls, path: Path) -> SurrogateData:
         """Read the arrays; raises ModelError."""
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                data = cls(**{entry.name: arrays[entry.name] for entry in fields(cls)})
-        except (OSError, ValueError, KeyError, BadZipFile) as error:
-            raise ModelError(f'{path} holds no surrogate data: {error!r}') from error
-        rows, frames = len(data.features), len(data.word_score)
-        if (data.features.ndim != 2 or data.gain.shape != (rows,)
-                or data.is_loop.shape != (rows,) or data.word_loop.shape != (frames,)
-                or not np.isfinite(data.features).all()):
-            raise ModelError(f'{path}: the arrays of the surrogate data do not belong together')
+            data = cls(**read_npz(path, [entry.name for entry in fields(cls)]))
+        except FileError as error:
+            raise ModelError(f'{path} holds no surrogate data: {error}; "adversarial-lcd train" '
+                             'makes some') from error
+        data.check(path)
         return data
+
+    def check(self, path: Path) -> None:
+        """Raise ModelError, naming the file, if the arrays are not what the class says."""
+        numbers = (self.features, self.gain, self.word_score)
+        if not (all(array.dtype.kind == 'f' for array in numbers)
+                and self.is_loop.dtype == self.word_loop.dtype == bool
+                and self.features.ndim == 2 and self.word_score.ndim == 1
+                and self.gain.shape == self.is_loop.shape == self.features.shape[:1]
+                and self.word_loop.shape == self.word_score.shape
+                and all(np.isfinite(array).all() for array in numbers)):
+            raise ModelError(f'{path}: the arrays of the surrogate data do not belong together')
+        if len(self.features) > _MAX_ROWS:
+            raise ModelError(f'{path}: {len(self.features)} rows of surrogate data; expected at '
+                             f'most {_MAX_ROWS}')

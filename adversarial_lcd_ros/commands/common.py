@@ -34,7 +34,7 @@ def add_json_option(parser: ArgumentParser) -> None:
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print values as JSON; what is not a finite number becomes null."""
-    from adversarial_lcd_ros.files import json_text
+    from adversarial_lcd_ros.files.writing import json_text
 
     print(json_text(values), end='')
 

@@ -53,7 +53,7 @@ def _compare(options: Namespace) -> None:
 
 def _write_picture(comparison: Comparison, path: Path) -> Path | None:
     from adversarial_lcd_ros.evaluation.comparison_plot import draw_comparison
-    from adversarial_lcd_ros.files import write_text
+    from adversarial_lcd_ros.files.writing import write_text
 
     drawn = draw_comparison(comparison)
     if drawn is None:

@@ -77,12 +77,12 @@ def add(commands: Commands) -> None:
 
 
 def _run(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.detectors.run import KIND, SCHEMA, run_target
+    from adversarial_lcd_ros.evaluation.detectors.run import KIND, ROW_COLUMNS, SCHEMA, run_target
     from adversarial_lcd_ros.evaluation.detectors.tables import TABLES, target_tables
     from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
     from adversarial_lcd_ros.evaluation.store import open_store
     from adversarial_lcd_ros.evaluation.workers import local_workers
-    from adversarial_lcd_ros.files import write_text
+    from adversarial_lcd_ros.files.writing import write_text
 
     for name in ('pairs', 'draws', 'jobs'):
         if getattr(options, name) < 1:
@@ -93,6 +93,7 @@ def _run(options: Namespace) -> None:
         results = ResultsFolder(options.output)
         results.write_setup([], sys.argv, options.seed,
                             {'sequences': [asdict(sequence) for sequence in sequences]})
+        store.check([task.key for task in tasks], ROW_COLUMNS)
         left = [task for task in tasks if task.key not in store.rows]
         tell(f'{len(left)} of {len(tasks)} rows to make')
         with local_workers(options.jobs) as run, progress_bar('targets') as progress:

@@ -6,17 +6,17 @@ from functools import lru_cache
 import hashlib
 from pathlib import Path
 
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.reading import read_bytes
 
 
 @lru_cache(32)
 def file_digest(path: Path) -> str:
     """Return the digest of a model file, hexadecimal; raises ModelError."""
     try:
-        return digest_of(path.read_bytes())
-    except OSError as error:
-        raise ModelError(f'{path} cannot be read: {error.strerror}; name a file that '
-                         '"adversarial-lcd train" wrote') from error
+        return digest_of(read_bytes(path))
+    except FileError as error:
+        raise ModelError(f'{error}; name a file that "adversarial-lcd train" wrote') from error
 
 
 def digest_of(data: bytes) -> str:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.results import PICTURES, read_json
-from adversarial_lcd_ros.files import write_json
+from adversarial_lcd_ros.files.reading import MIB, read_bytes
+from adversarial_lcd_ros.files.writing import write_bytes, write_json
 
 _INDEX = 'pictures.json'
 _JPEG_QUALITY = 82
+_MAX_JPEG_BYTES = 16 * MIB
 
 @dataclass(frozen=True, eq=False)
 class Picture:
@@ -55,16 +57,29 @@ def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
                                   f'{picture.image.shape}: expected uint8 (h, w, 3)')
         name = f'{number:02d}.jpg'
         _, code = cv2.imencode('.jpg', picture.image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        (place / name).write_bytes(code.tobytes())
+        write_bytes(place / name, code.tobytes())
         index.append({'file': name, 'title': picture.title, 'caption': picture.caption})
     write_json(place / _INDEX, {'pictures': index})
 
 
 def read_pictures(folder: Path) -> list[tuple[str, str, bytes]]:
-    """Return title, caption and JPEG bytes of the pictures that ``write_pictures`` wrote."""
+    """
+    Return title, caption and JPEG bytes of the pictures that ``write_pictures`` wrote.
+
+    Raises
+    ------
+    EvaluationError, FileError
+        The folder is damaged.
+
+    """
     place = folder / PICTURES
     if not place.is_dir():
         return []
-    entries = read_json(place / _INDEX)['pictures']
-    return [(entry['title'], entry['caption'], (place / Path(entry['file']).name).read_bytes())
-            for entry in entries]
+    index = read_json(place / _INDEX)
+    try:
+        return [(str(entry['title']), str(entry['caption']),
+                 read_bytes(place / Path(entry['file']).name, _MAX_JPEG_BYTES))
+                for entry in index['pictures']]
+    except (KeyError, TypeError) as error:
+        raise EvaluationError(f'{place / _INDEX} is no list of pictures: {error!r}; make the '
+                              'results anew') from error

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, FileError
+from adversarial_lcd_ros.files.reading import read_yaml
 from adversarial_lcd_ros.paths import share_path
 
 FOLDER = 'config/recipes'
@@ -53,9 +52,9 @@ def load_yaml(name: str) -> tuple[Path, dict[str, Any]]:
     """
     path = find_recipe(name)
     try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f'recipe {path} cannot be read: {error}') from error
+        content = read_yaml(path)
+    except FileError as error:
+        raise ConfigError(f'recipe {error}') from error
     if not isinstance(content, dict):
         raise ConfigError(f'recipe {path} holds a {type(content).__name__}: expected lists by '
                           'name, such as "attacks" or "sequences"')

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
-import json
 from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.config import Config
 from adversarial_lcd_ros.environment import environment
-from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.files import write_json
+from adversarial_lcd_ros.errors import EvaluationError, FileError
+from adversarial_lcd_ros.files import reading
+from adversarial_lcd_ros.files.writing import write_json
 
 SUMMARY, RECORDS, REPORT = 'summary.json', 'per_query.csv', 'report.html'
 CONFIGURATION, ENVIRONMENT, PICTURES = 'configuration.json', 'environment.json', 'pictures'
@@ -143,9 +143,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
     """
     try:
-        values = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError) as error:
-        raise EvaluationError(f'{path} cannot be read: {error}') from error
+        values = reading.read_json(path)
+    except FileError as error:
+        raise EvaluationError(str(error)) from error
     if not isinstance(values, dict):
         raise EvaluationError(f'{path} holds a {type(values).__name__}: expected an object')
     return values

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 import fcntl
 import json
@@ -11,12 +11,16 @@ import os
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import EvaluationError, FileError
+from adversarial_lcd_ros.files.reading import MIB, parse_json, read_bytes
 
 CELLS = 'cells.jsonl'
 Row = dict[str, Any]  # one line of it, or of summary.json: column to value
 _LOCK = '.lock'
+_MAX_BYTES = 2048 * MIB
 _log = logging.getLogger(__name__)
+
+Columns = Mapping[str, tuple[type, ...]]
 
 
 class CellStore:
@@ -60,6 +64,32 @@ class CellStore:
             raise EvaluationError(f'{self.path} cannot be written ({error}); make room and run '
                                   'the same command again: finished cells are kept') from error
         self.rows[key] = kept
+
+
+    def check(self, keys: Iterable[str], columns: Columns) -> None:
+        """
+        Look whether rows have the columns that whoever made them writes.
+
+        Parameters
+        ----------
+        keys : iterable of str
+            Those that are not there do not count.
+        columns : mapping
+            Name to the types of its values.
+
+        Raises
+        ------
+        EvaluationError
+            A row lacks a column, or it is of another type.
+
+        """
+        for row in (self.rows[key] for key in keys if key in self.rows):
+            wrong = [name for name, kinds in columns.items()
+                     if name not in row or not isinstance(row[name], kinds)]
+            if wrong:
+                raise EvaluationError(
+                    f'{self.path}, cell {row["key"]}: {", ".join(wrong)} is missing, or not what '
+                    'it should be: delete the line, and its cell runs again')
 
 
 @contextmanager
@@ -109,7 +139,7 @@ def read_cells(folder: Path) -> list[dict[str, Any]]:
 def _read_rows(path: Path, *, repair: bool) -> dict[str, dict[str, Any]]:
     if not path.exists():
         return {}
-    content = path.read_bytes()
+    content = read_bytes(path, _MAX_BYTES)
     whole = content.rfind(b'\n') + 1
     if whole < len(content) and repair:
         _log.warning('%s: the last line is cut off (%d bytes); dropped, its cell runs again',
@@ -118,10 +148,10 @@ def _read_rows(path: Path, *, repair: bool) -> dict[str, dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for number, line in enumerate(content[:whole].splitlines(), start=1):
         try:
-            row = json.loads(line)
+            row = parse_json(line, 'the line')
             key = str(row['key'])
-        except (ValueError, TypeError, KeyError) as error:
-            raise EvaluationError(f'{path}, line {number} is no finished cell ({error!r}): delete '
+        except (FileError, TypeError, KeyError) as error:
+            raise EvaluationError(f'{path}, line {number} is no finished cell ({error}): delete '
                                   'the line, and its cell runs again') from error
         if key in rows:
             raise EvaluationError(f'{path}, line {number}: the cell is there twice; delete one '

@@ -6,10 +6,7 @@ from collections.abc import Sequence as Several
 from dataclasses import asdict
 import hashlib
 import json
-import os
 from pathlib import Path
-import tempfile
-from zipfile import BadZipFile
 
 import cv2
 import numba
@@ -20,7 +17,11 @@ import scipy
 from adversarial_lcd_ros.codec import decode_graph, encode_graph, schema_text
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.environment import code_digest
-from adversarial_lcd_ros.errors import CodecError, EvaluationError, ModelError
+from adversarial_lcd_ros.errors import CodecError, EvaluationError, FileError, ModelError
+from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.files.network import MAX_NETWORK_BYTES
+from adversarial_lcd_ros.files.reading import read_bytes
+from adversarial_lcd_ros.files.writing import replacing
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.paths import VOCABULARY, model_path, object_model_path
 from adversarial_lcd_ros.sequences import Sequence
@@ -28,6 +29,7 @@ from adversarial_lcd_ros.sequences import Sequence
 # What decides on the bytes of a graph: libraries, and code of this package.
 _LIBRARIES = (np, scipy, cv2, onnxruntime, numba)
 _CODE = ('vision', 'graph', 'compiled', 'codec', 'sequences/frame', 'sequences/detections')
+_MAX_CACHE_BYTES = 1 << 33
 # Threads change how long a graph takes, not what it is.
 _IRRELEVANT = ('threads',)
 
@@ -76,11 +78,10 @@ def _named_files(config: BuilderConfig) -> list[Path]:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ModelError(f'{path} cannot be read: {error}; "adversarial-lcd fetch-model" provides '
-                         'the default object model, "adversarial-lcd train" a vocabulary'
-                         ) from error
+        return read_bytes(path, MAX_NETWORK_BYTES)
+    except FileError as error:
+        raise ModelError(f'{error}; "adversarial-lcd fetch-model" provides the default object '
+                         'model, "adversarial-lcd train" a vocabulary') from error
 
 
 def save_graphs(path: Path, graphs: Several[MultiTierGraph]) -> None:
@@ -98,12 +99,10 @@ def save_graphs(path: Path, graphs: Several[MultiTierGraph]) -> None:
     payloads = [encode_graph(graph) for graph in graphs]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix='.graphs-', dir=path.parent) as hidden:
-            work = Path(hidden) / path.name
-            np.savez(work, payload=np.frombuffer(b''.join(payloads), np.uint8),
+        with replacing(path) as stream:
+            np.savez(stream, payload=np.frombuffer(b''.join(payloads), np.uint8),
                      length=np.array([len(payload) for payload in payloads], np.int64))
-            os.replace(work, path)
-    except OSError as error:
+    except (OSError, FileError) as error:
         raise EvaluationError(f'graphs cannot be kept in {path.parent} ({error}): name another '
                               'folder, or set ADVERSARIAL_LCD_CACHE') from error
 
@@ -120,12 +119,12 @@ def load_graphs(path: Path) -> list[MultiTierGraph]:
     """
     try:
         # The checksums of the archive find what was damaged; the codec, what never was a graph.
-        with np.load(path, allow_pickle=False) as arrays:
-            payload, length = arrays['payload'].tobytes(), arrays['length']
+        arrays = read_npz(path, ('payload', 'length'), limit=_MAX_CACHE_BYTES, ratio=1)
+        payload, length = arrays['payload'].tobytes(), arrays['length']
         ends = np.cumsum(length)
         if len(ends) and (length.min() < 0 or ends[-1] != len(payload)):
             raise ValueError(f'{len(payload)} bytes for graphs of {ends[-1]}')
         return [decode_graph(payload[end - size:end])
                 for size, end in zip(length.tolist(), ends.tolist(), strict=True)]
-    except (OSError, EOFError, TypeError, ValueError, KeyError, BadZipFile, CodecError) as error:
-        raise EvaluationError(f'{path} holds no graphs: {error!r}; delete it') from error
+    except (FileError, CodecError, TypeError, ValueError) as error:
+        raise EvaluationError(f'{path} holds no graphs: {error}; delete it') from error

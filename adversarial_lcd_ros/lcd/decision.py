@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.reading import read_json
+from adversarial_lcd_ros.files.writing import write_json
 
 FORMAT = 'adversarial_lcd_ros/decision/1'
+# Scores are shares: beyond this a decision is a step, and sums leave the range of numbers.
+_MAX_WEIGHT = 1e9
+_MAX_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class Decision:
         """Write the decision and its card as JSON."""
         text = {'format': FORMAT, 'target': self.target, 'channels': list(self.channels),
                 'weights': list(self.weights), 'bias': self.bias, 'card': self.card}
-        path.write_text(json.dumps(text, indent=2) + '\n', encoding='utf-8')
+        write_json(path, text)
 
     @classmethod
     def load(cls, path: Path, target: str, channels: tuple[str, ...]) -> Decision:
@@ -77,13 +81,14 @@ class Decision:
 
         """
         try:
-            text = json.loads(path.read_text(encoding='utf-8'))
+            text = read_json(path, _MAX_BYTES)
             decision = cls(str(text['target']), tuple(text['channels']),
                            tuple(float(weight) for weight in text['weights']),
                            float(text['bias']), dict(text.get('card', {})))
             kind = text['format']
-        except (OSError, ValueError, TypeError, KeyError) as error:
-            raise ModelError(f'{path} is no trained decision: {error!r}; train one with '
+        except (FileError, ValueError, TypeError, KeyError, OverflowError) as error:
+            detail = error if isinstance(error, FileError) else repr(error)
+            raise ModelError(f'{path} is no trained decision: {detail}; train one with '
                              '"adversarial-lcd train"') from error
         if kind != FORMAT:
             raise ModelError(f'{path} has format {kind!r}: expected {FORMAT!r}')
@@ -91,9 +96,10 @@ class Decision:
             raise ModelError(f'{path} was trained for target {decision.target} '
                              f'{decision.channels}: expected {target} {channels}')
         if len(decision.weights) != len(channels) or not all(
-                math.isfinite(value) for value in (*decision.weights, decision.bias)):
-            raise ModelError(f'{path}: expected {len(channels)} finite weights and a bias, '
-                             f'found {decision.weights} and {decision.bias}')
+                abs(value) <= _MAX_WEIGHT for value in (*decision.weights, decision.bias)):
+            raise ModelError(f'{path}: expected {len(channels)} finite weights and a bias, from '
+                             f'-{_MAX_WEIGHT:g} to {_MAX_WEIGHT:g}, found {decision.weights} and '
+                             f'{decision.bias}')
         return decision
 
 

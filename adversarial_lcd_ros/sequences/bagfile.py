@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+import os
 from pathlib import Path
 import shutil
 import struct
@@ -187,7 +188,9 @@ class BagWriter:
     """
 
     def __init__(self, destination: Path, *, overwrite: bool = False) -> None:
-        self._destination, self._overwrite = destination.resolve(), overwrite
+        # What the name leads to stays a link: it is refused, and its target never replaced.
+        self._destination = destination.parent.resolve() / destination.name
+        self._overwrite = overwrite
         _check_free(self._destination, overwrite)
         with self._written():
             self._destination.parent.mkdir(parents=True, exist_ok=True)
@@ -278,6 +281,9 @@ class BagWriter:
 
 
 def _check_free(destination: Path, overwrite: bool) -> None:
+    if destination.is_symlink():
+        raise SequenceError(f'{destination} is a link to {os.readlink(destination)}: remove it, '
+                            'or name the folder itself')
     if not destination.exists():
         return
     if not overwrite:

@@ -9,7 +9,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import FileError, SequenceError
+from adversarial_lcd_ros.files.reading import MIB, read_bytes
 from adversarial_lcd_ros.sequences.frame import Frame, is_depth_file, open_compressed
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
@@ -17,6 +18,7 @@ from adversarial_lcd_ros.sequences.trajectory import Trajectory
 DEFAULT_RATE_HZ = 30.0
 _SUFFIXES = ('.jpg', '.jpeg', '.png', '.webp')
 _HEADER_BYTES = 32
+MAX_PICTURE_BYTES = 128 * MIB
 
 
 def is_hidden(path: Path) -> bool:
@@ -81,9 +83,9 @@ def read_image(path: Path, stamp_ns: int, size: tuple[int, int] | None) -> Frame
 
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SequenceError(f'image {path} cannot be read: {error}') from error
+        data = read_bytes(path, MAX_PICTURE_BYTES)
+    except FileError as error:
+        raise SequenceError(f'image {error}') from error
     if is_depth_file(data):
         raise SequenceError(f'image {path} has 16 bits a pixel and no colour, as depth maps '
                             'have: name the folder of the camera, or convert it to 8 bits')

@@ -27,6 +27,7 @@ CAMERA_FRAME = 'camera'
 _MARGIN_NS = 100_000_000
 # Who made the pictures, and what one may do with them.
 _TERMS = ('credits', 'license', 'licence')
+_MAX_TERMS_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
     """
     if raw_as not in (JPEG, PNG):
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
+    terms = _terms(Path(source))
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
         sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz,
                                  camera=camera, truth=truth, stamps=stamps)
@@ -93,7 +95,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
                 camera_messages(sequence), poses, map(_image_message, frames),
                 key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
-        for file in _terms(Path(source)):
+        for file in terms:
             bag.attach(file)
     return _summary(Path(destination), sequence, len(poses))
 
@@ -109,8 +111,17 @@ def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
 def _terms(source: Path) -> list[Path]:
     if not source.is_dir():
         return []
-    return [path for path in sorted(source.iterdir())
-            if path.is_file() and path.stem.lower() in _TERMS]
+    found = [path for path in sorted(source.iterdir()) if path.stem.lower() in _TERMS
+             and not path.is_dir()]
+    for path in found:
+        # A recording from elsewhere must not put a file of this machine into the bag.
+        if not path.resolve().is_relative_to(source.resolve()):
+            raise SequenceError(f'{path} is a link out of its folder, to {path.resolve()}: it '
+                                'would go into the bag; put the text itself there, or remove it')
+        if not path.is_file() or path.stat().st_size > _MAX_TERMS_BYTES:
+            raise SequenceError(f'{path} is no file of at most {_MAX_TERMS_BYTES} bytes: expected '
+                                'the terms of use, or nothing of this name')
+    return found
 
 
 def _counted(frames: Iterator[Frame], total: int, raw_as: str,

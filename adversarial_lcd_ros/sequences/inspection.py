@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.errors import CodecError, FileError
+from adversarial_lcd_ros.files.reading import read_bytes
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagFile
@@ -163,13 +164,9 @@ def inspect_payload(path: Path) -> tuple[str, Any]:
 
     """
     try:
-        size = path.stat().st_size
-        if size > codec.MAX_PAYLOAD_BYTES:
-            raise CodecError(f'{path} has {size} bytes: a payload has at most '
-                             f'{codec.MAX_PAYLOAD_BYTES}')
-        name, content = identify_payload(path.read_bytes())
-    except OSError as error:
-        raise CodecError(f'{path} cannot be read: {error.strerror}') from error
+        name, content = identify_payload(read_bytes(path, codec.MAX_PAYLOAD_BYTES))
+    except FileError as error:
+        raise CodecError(str(error)) from error
     if not name:
         raise CodecError(f'{path} is neither a bag nor a payload of '
                          f'{", ".join(codec.MESSAGES)}{_nearly(path.read_bytes())}')

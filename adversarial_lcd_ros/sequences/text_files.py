@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 
-from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.errors import FileError, SequenceError
+from adversarial_lcd_ros.files.reading import read_bytes
 
 _COMMENT = re.compile(r'(^|\s)#.*')
 # A text of UTF-32 would start like one of UTF-16: the longer mark is looked for first.
@@ -27,10 +28,10 @@ def read_text(path: Path) -> str:
 
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
         encoding = next((name for mark, name in _MARKS if data.startswith(mark)), 'utf-8')
         text = data.decode(encoding)
-    except (OSError, UnicodeDecodeError) as error:
+    except (FileError, UnicodeDecodeError) as error:
         raise SequenceError(f'{path} cannot be read: {error}') from error
     if '\0' in text:
         raise SequenceError(f'{path} is no text in UTF-8, and UTF-16 needs a byte order mark: '

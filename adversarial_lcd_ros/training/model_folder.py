@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import hashlib
-import json
 from pathlib import Path
 import tempfile
 from typing import Any
 
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.reading import read_json
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.sequences.part import SequencePart
 
 MODEL_CARD = 'MODEL_CARD.json'
+_MAX_CARD_BYTES = 1 << 22
 _TARGET, _NETWORK = 'target_{}.json', 'target_{}.onnx'
 _OURS = (VOCABULARY, SURROGATE_DATA, MODEL_CARD, _TARGET.format('*'), _NETWORK.format('*'))
 
@@ -111,9 +112,10 @@ def trained_on(decision: Path, source: str,
 
     """
     try:
-        text = (decision.parent / MODEL_CARD).read_text(encoding='utf-8')
-        sequences = [(entry['name'], *entry['part']) for entry in json.loads(text)['sequences']]
-    except (OSError, ValueError, KeyError, TypeError):
+        card = read_json(decision.parent / MODEL_CARD, _MAX_CARD_BYTES)
+        sequences = [(str(entry['name']), float(entry['part'][0]), float(entry['part'][1]))
+                     for entry in card['sequences']]
+    except (FileError, ValueError, LookupError, TypeError, OverflowError):
         return None
     part = SequencePart.parse(source)
     length = part.stop - part.start

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
-import json
 from pathlib import Path
 import shutil
 from typing import Any
@@ -19,6 +18,7 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.files.writing import write_json
 from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
@@ -181,7 +181,7 @@ def train(sources: Sequence[SequencePart], output: Path, *, seed: int = 42,
                          'lcd': asdict(plan.lcd), 'pairs': plan.pairs},
             'files': file_digests(work),
             **_versions()}
-        (work / MODEL_CARD).write_text(json.dumps(card, indent=2) + '\n', encoding='utf-8')
+        write_json(work / MODEL_CARD, card)
     return card
 
 

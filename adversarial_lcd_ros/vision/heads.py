@@ -12,6 +12,7 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (16, 32))
 _TOLERANCE = 0.01
 # The largest number of a box whose sides are shares of the image; no object is so few pixels.
 _MAX_SHARE = 1.5
+_MAX_CLASSES = 1 << 16
 
 
 def is_grid(rows: int | str, size: tuple[int, int]) -> bool:
@@ -33,8 +34,10 @@ def wrong_scores(score: NDArray[np.float32]) -> str:
 
 def wrong_classes(label: NDArray[np.float32]) -> str:
     """Return what is wrong with classes, float32 (k,); '' if nothing is."""
-    odd = label[~(np.abs(label - np.round(label)) <= _TOLERANCE) | (label < 0)]
-    return f'the class {odd[0]:.4g} where a whole number is expected' if len(odd) else ''
+    odd = label[~(np.abs(label - np.round(label)) <= _TOLERANCE) | (label < 0)
+                | (label >= _MAX_CLASSES)]
+    return (f'the class {odd[0]:.4g} where a whole number below {_MAX_CLASSES} is expected'
+            if len(odd) else '')
 
 
 def wrong_corners(corners: NDArray[np.float32]) -> str:
@@ -50,4 +53,9 @@ def wrong_pixels(boxes: NDArray[np.float32]) -> str:
     """Return what is wrong with the numbers of sure boxes, float32 (k, 4); '' if nothing is."""
     if len(boxes) and 0 < np.abs(boxes).max() <= _MAX_SHARE:
         return 'boxes in shares of the image where pixels of the input are expected'
-    return ''
+    return not_finite(boxes)
+
+
+def not_finite(boxes: NDArray[np.float32]) -> str:
+    """Return what is wrong with boxes, float32 (k, 4), that are not of numbers; '' if nothing."""
+    return '' if np.isfinite(boxes).all() else 'a box of NaN or infinity'

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import json
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-import onnxruntime
 
 from adversarial_lcd_ros.config import BuilderConfig
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.network import NETWORK_ROOM_BYTES, bounded_memory, open_network
+from adversarial_lcd_ros.files.reading import parse_json
 from adversarial_lcd_ros.vision import heads
 
 # RGB, for grey levels from 0 to 1.
@@ -22,6 +22,9 @@ IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
 IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 NMS_IOU = 0.45
 LETTERBOX_GREY = 114
+# Boxes that suppression looks at, the most confident first: its time grows with their square.
+_MOST_BOXES = 4096
+_MOST_VALUES = 1 << 26
 _EXPECTED = ('expected a PaddleDetection export (image, scale_factor) or one of YOLOv8 or later '
              'for detection, in float32 (of YOLOv5 to 7: export it with suppression inside, rows '
              'of x1 y1 x2 y2 score class), or write its detections as CSV for the detector "csv"')
@@ -82,7 +85,7 @@ class Detections:
         order = np.argsort(-score, kind='stable')
         order = order[(box[order, 2:] > 0).all(axis=1)]
         return cls(label[order].astype(np.uint32), box[order].astype(np.float32),
-                   score[order].astype(np.float32))
+                   np.minimum(score[order], 1).astype(np.float32))
 
 
 def filter_objects(found: Detections, width: int, height: int,
@@ -133,21 +136,15 @@ class ObjectDetector:
         if not model.is_file():
             raise ModelError(f'no object model at {model}: run "adversarial-lcd fetch-model", or '
                              'name one by the setting "model", or set "detector" to "none"')
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.log_severity_level = 3
-        # Spinning threads would take a core from the feature extraction that runs beside.
-        options.add_session_config_entry('session.intra_op.allow_spinning', '0')
         try:
-            self._session = onnxruntime.InferenceSession(
-                str(model), options, providers=['CPUExecutionProvider'])
-        except Exception as error:  # onnxruntime's own classes are private
-            raise ModelError(f'{model} cannot be loaded as ONNX: {error}; '
-                             '"adversarial-lcd fetch-model" provides the default model'
+            self._session = open_network(model, threads)
+        except FileError as error:
+            raise ModelError(f'{error}; "adversarial-lcd fetch-model" provides the default model'
                              ) from error
         self._run = self._recognise()
         # A model that cannot run says so now, and the first frame finds it warm.
-        self.detect(np.zeros((*self._size[::-1], 3), np.uint8))
+        with bounded_memory(NETWORK_ROOM_BYTES):
+            self.detect(np.zeros((*self._size[::-1], 3), np.uint8))
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """
@@ -207,8 +204,8 @@ class ObjectDetector:
         if not _are_sides(sides):
             named = self._session.get_modelmeta().custom_metadata_map.get('imgsz', '')
             try:
-                sides = json.loads(named)
-            except ValueError:
+                sides = parse_json(named, 'imgsz')
+            except FileError:
                 sides = None
         if len(shape) != 4 or shape[1] != 3 or not _are_sides(sides):
             raise ModelError(f'{self._model}: the input has shape {shape}; expected (batch, 3, '
@@ -227,6 +224,9 @@ class ObjectDetector:
                 for side, expected in zip(found.shape, shape, strict=True)):
             raise ModelError(f'{self._model}: output {self._output} of shape {found.shape}; '
                              f'expected {shape}')
+        if found.size > _MOST_VALUES:
+            raise ModelError(f'{self._model}: output {self._output} has {found.size} values; '
+                             f'expected at most {_MOST_VALUES}')
         return found
 
     def _paddle(self, image: NDArray[np.uint8]) -> Detections:
@@ -242,6 +242,7 @@ class ObjectDetector:
         found = found[~(found[:, 0] < 0)]
         self._check(heads.wrong_scores(found[:, 1]))
         found = found[found[:, 1] >= self._score]
+        self._check(heads.wrong_classes(found[:, 0]), heads.not_finite(found[:, 2:6]))
         return Detections.of(found[:, 0], found[:, 2:6], found[:, 1], width, height)
 
     def _letterboxed(self, image: NDArray[np.uint8], shape: tuple[int | None, ...]
@@ -269,7 +270,7 @@ class ObjectDetector:
         # Classes lie side by side, too far apart to overlap: one is not suppressed by another.
         apart = centre - size / 2 + 2 * max(self._size) * label[:, None]
         kept = np.asarray(cv2.dnn.NMSBoxes(np.hstack([apart, size]).tolist(), score.tolist(), 0.0,
-                                           NMS_IOU), np.int64).ravel()
+                                           NMS_IOU, top_k=_MOST_BOXES), np.int64).ravel()
         corners = np.hstack([centre - size / 2, centre + size / 2])
         return self._unboxed(label[kept], corners[kept], score[kept], image, scale, offset)
 

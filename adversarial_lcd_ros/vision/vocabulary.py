@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.hamming import descend, lanes, nearest
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.files.writing import replacing
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES
 
 ROUNDS = 12
+_MAX_BRANCHING, _MAX_DEPTH = 1024, 24
 # Descriptors that are unpacked at a time: bounds the memory of training.
 _CHUNK = 1 << 15
 
@@ -50,7 +52,11 @@ class Vocabulary:
     def __post_init__(self) -> None:
         """Check shapes, types and values."""
         b, d = self.branching, self.depth
-        if b < 2 or d < 1 or self.centre.dtype != np.uint8 or self.centre.shape != (
+        # Bounds first: b^d of a hostile file takes for ever to compute.
+        if not (2 <= b <= _MAX_BRANCHING and 1 <= d <= _MAX_DEPTH):
+            raise ModelError(f'vocabulary of branching {b} and depth {d}: expected 2 to '
+                             f'{_MAX_BRANCHING} and 1 to {_MAX_DEPTH}')
+        if self.centre.dtype != np.uint8 or self.centre.shape != (
                 sum(b ** level for level in range(1, d + 1)), DESCRIPTOR_BYTES):
             raise ModelError(f'vocabulary of branching {b} and depth {d}: found centres '
                              f'{self.centre.dtype}{self.centre.shape}')
@@ -103,18 +109,19 @@ class Vocabulary:
 
     def save(self, path: Path) -> None:
         """Write as npz; same vocabulary, same bytes."""
-        np.savez_compressed(path, centre=self.centre, idf=self.idf,
-                            shape=np.array([self.branching, self.depth]))
+        with replacing(path) as stream:
+            np.savez_compressed(stream, centre=self.centre, idf=self.idf,
+                                shape=np.array([self.branching, self.depth]))
 
     @classmethod
     def load(cls, path: Path) -> Vocabulary:
         """Read a vocabulary that ``save`` wrote; raises ModelError."""
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                branching, depth = (int(value) for value in arrays['shape'])
-                return cls(arrays['centre'], arrays['idf'], branching, depth)
-        except (OSError, EOFError, TypeError, ValueError, KeyError, BadZipFile) as error:
-            raise ModelError(f'{path} is no vocabulary: {error!r}; train one with '
+            arrays = read_npz(path, ('shape', 'centre', 'idf'))
+            branching, depth = (int(value) for value in arrays['shape'])
+            return cls(arrays['centre'], arrays['idf'], branching, depth)
+        except (FileError, ModelError, TypeError, ValueError, OverflowError) as error:
+            raise ModelError(f'{path} is no vocabulary: {error}; train one with '
                              '"adversarial-lcd train"') from error
 
 

@@ -7,7 +7,7 @@ frame of a replay is judged against the keyframes before it, retrieval by words 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 import json
@@ -44,6 +44,16 @@ _CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'ground_t
          'training/pair_scores', 'evaluation/metrics', 'evaluation/intervals',
          'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')
+
+_FIGURES = ('positives', 'negatives', 'balanced_accuracy', 'average_precision',
+            'recall_at_100_precision', 'mcc', 'precision', 'recall')
+# What the columns of a row hold, for whoever reads rows that another run has written.
+ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
+    **dict.fromkeys(('sequence', 'target', 'protocol'), (str,)),
+    **dict.fromkeys(('nodes', 'nodes_mean', 'frames'), (int, float)),
+    **dict.fromkeys(_FIGURES, (int, float, type(None))),
+    **dict.fromkeys(('trained_on', 'references_trained_on'), (bool, type(None))),
+    'scored': (list,), 'geometric_check': (bool,), 'ci95': (list, type(None)), 'labels': (dict,)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +215,4 @@ def _live(task: TargetTask) -> Row:
 
 
 def _figures(metrics: Metrics | None) -> Row:
-    return {name: getattr(metrics, name, None) for name in (
-        'positives', 'negatives', 'balanced_accuracy', 'average_precision',
-        'recall_at_100_precision', 'mcc', 'precision', 'recall')}
+    return {name: getattr(metrics, name, None) for name in _FIGURES}

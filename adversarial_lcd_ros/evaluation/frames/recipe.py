@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from itertools import product
+import math
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -35,6 +36,9 @@ from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
 
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
+# Without their seeds; the paper's experiments have some hundred.
+MAX_CELLS = 10_000
+MAX_RUNS = 1_000_000
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
 
 
@@ -95,6 +99,13 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
             if not overrides and (known.frames, known.seeds) != (cell.frames, cell.seeds):
                 raise ConfigError(f'recipe {path}: {cell.settings} is there twice, with other '
                                   'numbers of frames or seeds: expected it once')
+            if len(cells) > MAX_CELLS:
+                raise ConfigError(f'recipe {path} has more than {MAX_CELLS} attacks: expected '
+                                  'fewer; cut it into several recipes')
+    runs = sum(cell.seeds for cell in cells.values())
+    if runs > MAX_RUNS:
+        raise ConfigError(f'recipe {path}: {len(cells)} attacks with their seeds are {runs} '
+                          f'cells on each sequence; expected at most {MAX_RUNS}')
     return list(cells.values())
 
 
@@ -121,6 +132,10 @@ def _multiplied(path: Path, values: Mapping[str, Any]) -> Iterator[dict[str, Any
     empty = [name for name, axis in axes.items() if not axis]
     if empty:
         raise ConfigError(f'recipe {path}: {", ".join(empty)} is an empty list: expected values')
+    count = math.prod(map(len, axes.values()))
+    if count > MAX_CELLS:
+        raise ConfigError(f'recipe {path}: an attack has {count} combinations of settings; '
+                          f'expected at most {MAX_CELLS} in all')
     for choice in product(*axes.values()):
         yield dict(zip(axes, choice, strict=True))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,21 @@ from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 _TRACE_POINTS = 8
+# What the columns hold, for whoever reads rows that another run has written.
+_TEXT, _NUMBER, _FIGURE = (str,), (int, float), (int, float, type(None))
+ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
+    **dict.fromkeys(('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle',
+                     'mode', 'edits', 'variant', 'name', 'versions'), _TEXT),
+    **dict.fromkeys(('ratio', 'queries_per_edit', 'nodes', 'threshold', 'seed', 'frames',
+                     'positives', 'negatives', 'suppressed', 'invented', 'unattackable',
+                     'duration_s', 'query_s', 'search_s', 'judge_s'), _NUMBER),
+    **dict.fromkeys(('nodes_mean', 'edges_mean', 'accuracy_clean', 'accuracy_attacked',
+                     'balanced_clean', 'balanced_attacked', 'decline_pp', 'edits_mean',
+                     'queries_mean', 'success_rate'), _FIGURE),
+    'frame_results': (list,)}
+_FRAME_COLUMNS: Mapping[str, tuple[type, ...]] = {
+    **dict.fromkeys(('stamp', 'kind', 'edits', 'queries', 'edit_budget'), (int,)),
+    **dict.fromkeys(('clean', 'attacked', 'status'), _TEXT)}
 
 
 def make_row(cell: Cell, seed: int, sequence: str,
@@ -58,6 +73,13 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'success_rate': _mean(turned),
         'frame_results': [_frame(*entry) for entry in zip(results, before, after, strict=True)],
         'duration_s': sum(seconds.values()), **seconds}
+
+
+def are_frames(results: Sequence[Any]) -> bool:
+    """Tell whether ``frame_results`` of a row that was read are of frames."""
+    return all(isinstance(frame, dict) and all(
+        isinstance(frame.get(name), kinds) for name, kinds in _FRAME_COLUMNS.items())
+        for frame in results)
 
 
 def _outcomes(kind: NDArray[np.int8], results: Sequence[FrameResult],

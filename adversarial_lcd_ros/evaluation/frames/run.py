@@ -19,13 +19,14 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.environment import environment
+from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.attacked import (
     FrameSample,
     attack_frames,
     sample_frames,
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
-from adversarial_lcd_ros.evaluation.frames.rows import make_row
+from adversarial_lcd_ros.evaluation.frames.rows import ROW_COLUMNS, are_frames, make_row
 from adversarial_lcd_ros.evaluation.methods import method_of
 from adversarial_lcd_ros.evaluation.store import CellStore, Row
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
@@ -192,6 +193,7 @@ def run_sweep(sweep: Sweep, store: CellStore, run: Run,
         A worker was lost, an attack overspent its budget, or the rows cannot be written.
 
     """
+    _check_rows(sweep, store)
     done_s, finished = 0.0, sweep.finished
     whole_s = sweep.cost_s or 1.0
     for rows, cost_s in run(run_task, sweep.tasks):
@@ -200,6 +202,14 @@ def run_sweep(sweep: Sweep, store: CellStore, run: Run,
         done_s, finished = done_s + cost_s, finished + len(rows)
         progress(finished, done_s / whole_s)
     return [store.rows[key] for key in sweep.keys]
+
+
+def _check_rows(sweep: Sweep, store: CellStore) -> None:
+    store.check(sweep.keys, ROW_COLUMNS)
+    for key in sweep.keys:
+        if key in store.rows and not are_frames(store.rows[key]['frame_results']):
+            raise EvaluationError(f'{store.path}, cell {key}: frame_results are not of frames: '
+                                  'delete the line, and its cell runs again')
 
 
 def run_task(task: Task) -> tuple[list[tuple[str, Row]], float]:

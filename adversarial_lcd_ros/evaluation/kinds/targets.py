@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation.kinds.base import (
     ResultsKind,
 )
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.files import write_text
+from adversarial_lcd_ros.files.writing import write_text
 
 _FIGURES = {'average_precision': 'average precision', 'mcc': 'MCC',
             'recall_at_100_precision': 'recall at 100 % precision'}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import KIND, SCHEMA, Cell
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
 from adversarial_lcd_ros.evaluation.results import SUMMARY, summary_document
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.files import write_json, write_text
+from adversarial_lcd_ros.files.writing import write_csv, write_json, write_text
 
 CELLS_CSV, SUMMARY_CSV, TABLES_TEX = 'cells.csv', 'summary.csv', 'tables.tex'
 _LATEX = {'\\': r'\textbackslash{}', '&': r'\&', '%': r'\%', '$': r'\$', '#': r'\#', '_': r'\_',
@@ -92,9 +91,4 @@ def _bounds(cell: Mapping[str, Any]) -> dict[str, float | None]:
 
 def _write_csv(path: Path, lines: Sequence[Mapping[str, Any]]) -> None:
     names = list(dict.fromkeys(name for line in lines for name in line))
-    draft = path.with_name(f'.{path.name}.partial')
-    with draft.open('w', newline='', encoding='utf-8') as stream:
-        writer = csv.DictWriter(stream, names)
-        writer.writeheader()
-        writer.writerows(lines)
-    draft.replace(path)
+    write_csv(path, names, lines)

@@ -30,7 +30,7 @@ from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settin
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.files import write_text
+from adversarial_lcd_ros.files.writing import write_text
 
 TABLES_MD = 'tables.md'
 _PICTURES = 6

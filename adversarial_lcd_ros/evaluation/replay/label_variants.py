@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-import csv
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.metrics import Outcomes, balanced_accuracy, effect, outcomes
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
+from adversarial_lcd_ros.files.writing import write_csv
 from adversarial_lcd_ros.ground_truth.labels import (
     NEGATIVE,
     NO_MATCH,
@@ -87,10 +87,7 @@ def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
 
 def write_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write the rows as CSV."""
-    with path.open('w', newline='', encoding='utf-8') as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_csv(path, list(rows[0]), rows)
 
 
 def _outcomes(labels: FrameLabels, run: Sequence[QueryRecord]) -> Outcomes:

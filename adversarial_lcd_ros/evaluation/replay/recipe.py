@@ -9,6 +9,9 @@ from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.recipes import LIVE, read_recipe
 
+MAX_ATTACKS = 1000
+_MAX_NAME = 200
+
 
 def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
     """
@@ -37,8 +40,15 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
     for entry in content['attacks']:
         if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
             raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
-        title = entry.pop('name')
+        title = entry['name']
+        if not title.isprintable() or len(title) > _MAX_NAME:
+            raise ConfigError(f'recipe {path}: the name {title[:_MAX_NAME]!r} is longer than '
+                              f'{_MAX_NAME} characters, or not all of them can be printed')
         if title in attacks or title == 'clean':
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
-        attacks[title] = AttackConfig.from_mapping({**entry, **overrides})
+        settings = {name: value for name, value in entry.items() if name != 'name'}
+        attacks[title] = AttackConfig.from_mapping({**settings, **overrides})
+    if len(attacks) > MAX_ATTACKS:
+        raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
+                          f'expected at most {MAX_ATTACKS}')
     return attacks

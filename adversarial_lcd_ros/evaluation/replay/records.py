@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-import csv
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.codec import AttackReport, LoopClosure
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import EvaluationError, FileError
 from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
+from adversarial_lcd_ros.files.reading import csv_rows
+from adversarial_lcd_ros.files.writing import plain_cell, write_csv
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 
 CLEAN = 'clean'
 _KINDS = {'positive': POSITIVE, 'negative': NEGATIVE}
 NO_TRUTH = 'no_ground_truth'
 _PARSERS: dict[str, Callable[[str], Any]] = {
-    'int': int, 'float': float, 'str': str, 'bool': {'0': False, '1': True}.__getitem__}
+    'int': int, 'float': float, 'str': plain_cell, 'bool': {'0': False, '1': True}.__getitem__}
 
 
 @dataclass(frozen=True)
@@ -197,12 +198,7 @@ def column(records: Sequence[QueryRecord], name: str) -> NDArray[Any]:
 
 def write_records(path: Path, records: Sequence[QueryRecord]) -> None:
     """Write records as CSV; None becomes an empty cell, truth 1 or 0."""
-    with path.open('w', newline='', encoding='utf-8') as stream:
-        writer = csv.DictWriter(stream, [entry.name for entry in fields(QueryRecord)])
-        writer.writeheader()
-        for record in records:
-            writer.writerow({name: int(value) if isinstance(value, bool) else value
-                             for name, value in asdict(record).items()})
+    write_csv(path, [entry.name for entry in fields(QueryRecord)], map(asdict, records))
 
 
 def read_records(path: Path) -> list[QueryRecord]:
@@ -217,20 +213,22 @@ def read_records(path: Path) -> list[QueryRecord]:
     """
     names = [entry.name for entry in fields(QueryRecord)]
     try:
-        with path.open(newline='', encoding='utf-8') as stream:
-            reader = csv.DictReader(stream)
-            if reader.fieldnames != names:
-                raise EvaluationError(f'{path} has the columns {reader.fieldnames}: expected '
-                                      f'{names}; it is no per_query.csv of this version')
-            return [_parse(path, line, row) for line, row in enumerate(reader, start=2)]
-    except OSError as error:
-        raise EvaluationError(f'{path} cannot be read: {error.strerror}') from error
+        rows = csv_rows(path)
+        _, header = next(rows, (0, []))
+        if header != names:
+            raise EvaluationError(f'{path} has the columns {header}: expected {names}; it is no '
+                                  'per_query.csv of this version')
+        return [_parse(path, line, cells) for line, cells in rows]
+    except FileError as error:
+        raise EvaluationError(str(error)) from error
 
 
-def _parse(path: Path, line: int, row: Mapping[str, str]) -> QueryRecord:
+def _parse(path: Path, line: int, cells: Sequence[str]) -> QueryRecord:
     values: dict[str, Any] = {}
-    for entry in fields(QueryRecord):
-        text = row[entry.name]
+    if len(cells) != len(fields(QueryRecord)):
+        raise EvaluationError(f'{path}, line {line}: {len(cells)} cells; expected '
+                              f'{len(fields(QueryRecord))}')
+    for entry, text in zip(fields(QueryRecord), cells, strict=True):
         try:
             values[entry.name] = _cell(str(entry.type), text)
         except (ValueError, TypeError, KeyError) as error:

@@ -7,6 +7,8 @@ from pathlib import Path
 import shlex
 from typing import Any
 
+from jinja2 import TemplateError
+
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import wording
@@ -30,7 +32,7 @@ from adversarial_lcd_ros.evaluation.results import (
     ResultsFolder,
     read_json,
 )
-from adversarial_lcd_ros.files import write_text
+from adversarial_lcd_ros.files.writing import write_text
 
 _KIND_TEXT = (('positive', 'a loop is there to be found'),
               ('negative', 'a new place: no loop is there'),
@@ -86,8 +88,14 @@ def report_folder(folder: Path) -> Path:
         A file of the folder is missing or damaged.
 
     """
-    return _render(folder, from_document(read_json(folder / SUMMARY)),
-                   read_records(folder / RECORDS))
+    try:
+        return _render(folder, from_document(read_json(folder / SUMMARY)),
+                       read_records(folder / RECORDS))
+    except (LookupError, TypeError, ValueError, AttributeError, TemplateError) as error:
+        # Files may lack anything, or hold it in another form: no list of checks is complete.
+        detail = f'{type(error).__name__}: {error}'
+        raise EvaluationError(f'{folder} is no results folder of this release, or was changed '
+                              f'({detail}): evaluate anew') from error
 
 
 def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord]) -> Path:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE
-from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.network import open_network
 from adversarial_lcd_ros.lcd.targets.base import Target
 from adversarial_lcd_ros.lcd.targets.scores import share
 from adversarial_lcd_ros.lcd.views import Comparison, View
@@ -65,16 +66,10 @@ class GnnTarget(Target):
     flip_s: ClassVar[float] = 3.5e-3
 
     def __init__(self, network: Path | None = None) -> None:
-        import onnxruntime  # the other targets start sooner without it
-
         path = network or model_path(NETWORK)
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1
-        options.log_severity_level = 3
         try:
-            self._session = onnxruntime.InferenceSession(str(path), options,
-                                                         providers=['CPUExecutionProvider'])
-        except Exception as error:  # onnxruntime's own classes are private
+            self._session = open_network(path, threads=1)
+        except FileError as error:
             raise ModelError(f'{path} is no network: {error}; train one with "adversarial-lcd '
                              'train --targets gnn"') from error
         names = tuple(entry.name for entry in self._session.get_inputs())
