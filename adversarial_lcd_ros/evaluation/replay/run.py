@@ -37,7 +37,8 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     holds_graphs,
     open_graphs,
 )
-from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames, unlabelled
+from adversarial_lcd_ros.ground_truth.labelling import label_graphs
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, unlabelled
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
@@ -145,10 +146,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
 
 def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
             plan: Plan) -> FrameLabels:
-    stamps = [graph.stamp_ns for graph in clean.clean]
     if sequence.trajectory is None:
-        return unlabelled(stamps)
-    return label_frames(sequence.trajectory, stamps, sequence.image_size, plan.labels)
+        return unlabelled([graph.stamp_ns for graph in clean.clean])
+    return label_graphs(clean.clean, sequence.trajectory, sequence.source, plan.labels)
 
 
 def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
