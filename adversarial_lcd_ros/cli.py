@@ -19,6 +19,7 @@ from adversarial_lcd_ros.commands import (
     fetch_model,
     importing,
     inspect,
+    labels,
     params,
     report,
     targets,
@@ -59,7 +60,8 @@ def _parser() -> ArgumentParser:
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                compare.add, targets.add, train.add, fetch_model.add, inspect.add, params.add):
+                compare.add, targets.add, train.add, fetch_model.add, labels.add, inspect.add,
+                params.add):
         add(commands)
     return parser
 

@@ -83,5 +83,5 @@ def read_covisibility(path: Path) -> Covisibility:
             f'{path} holds percent {percent.dtype}{percent.shape} and timestamp '
             f'{seconds.dtype}{seconds.shape}: expected uint8 (n, n), 0 to 100, and float64 (n,)')
     if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0).any():
-        raise EvaluationError(f'{path}: timestamps must be finite and ascend')
+        raise EvaluationError(f'{path}: expected finite timestamps that ascend')
     return Covisibility(np.round(seconds * 1e9).astype(np.int64), percent)

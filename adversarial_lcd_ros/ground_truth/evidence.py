@@ -22,10 +22,11 @@ class Evidence:
     shared : bool
         The views have something in common: a match may rightly name the other.
     scaled : bool
-        Those of ``shared`` of which one holds the other as a small part: seen from nearer or
-        further, a change of scale.
+        One view holds the other as a small part: seen from nearer or further, a change of scale.
     elsewhere : bool
         Certainly other places: the views share nothing.
+    left : bool
+        A camera that comes from one to the other has looked away.
 
     """
 
@@ -33,6 +34,7 @@ class Evidence:
     shared: NDArray[np.bool_]
     scaled: NDArray[np.bool_]
     elsewhere: NDArray[np.bool_]
+    left: NDArray[np.bool_]
 
 
 def from_shares(share: NDArray[np.float64], config: LabelConfig) -> Evidence:
@@ -49,6 +51,6 @@ def from_shares(share: NDArray[np.float64], config: LabelConfig) -> Evidence:
     """
     # NaN compares as false: nothing is known of such a pair, from either side.
     less, more = np.minimum(share, share.T), np.maximum(share, share.T)
-    shared = more >= config.shared_share
+    shared, same = more >= config.shared_share, less >= config.shared_share
     return Evidence(less >= config.loop_share, shared, shared & (less < config.shared_share),
-                    more < config.elsewhere_share)
+                    more < config.elsewhere_share, ~same & ~np.isnan(less))

@@ -50,8 +50,8 @@ class FrameLabels:
         Pairs that it may certainly not: the views share nothing. What is neither possible nor
         elsewhere cannot be told.
     scaled : bool, (n, n)
-        Those of ``possible`` that are a change of scale: one view holds the other as a small
-        part.
+        Pairs that are a change of scale: one view holds the other as a small part. Where that
+        is shown, they are possible, too.
     candidates : int64, (n,)
         The frames 0 .. candidates[i] - 1 are old enough to close a loop with frame i.
     located : bool, (n,)
@@ -79,11 +79,10 @@ class FrameLabels:
 
     @cached_property
     def has_scale_only(self) -> NDArray[np.bool_]:
-        """Tell which frames share with old enough ones by a change of scale only, bool (n,)."""
+        """Tell which frames share with old enough ones by changes of scale only, bool (n,)."""
         old = np.arange(len(self.kind))[None, :] < self.candidates[:, None]
-        shared = self.possible & old
-        at_scale = shared & ~self.scaled
-        return np.asarray(shared.any(axis=1) & ~at_scale.any(axis=1))
+        at_scale = self.possible & ~self.scaled & old
+        return np.asarray((self.scaled & old).any(axis=1) & ~at_scale.any(axis=1))
 
     def count(self, name: str) -> int:
         """Return the number of frames of a kind in words."""
@@ -154,19 +153,13 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
 
     """
     stamps = _checked_stamps(stamp_ns)
-    row, located = nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
-    if not located.any():
-        raise EvaluationError(
-            f'none of {len(stamps)} frames has a ground truth pose within '
-            f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
-    rows = replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
-                   quaternion=trajectory.quaternion[row])
+    rows, located = located_poses(trajectory, stamps, config)
     judgement = (_judge(rows, image_size, config) if evidence is None
                  else _by_evidence(evidence))
     known = located[:, None] & located[None, :]
     judgement = _Judgement(*(getattr(judgement, part.name) & known
                              for part in fields(judgement)))
-    candidates = _candidates(stamps, config.min_gap_s)
+    candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
     return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
                        judgement.possible, judgement.far, judgement.scaled, candidates, located)
@@ -180,6 +173,26 @@ def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
     nothing = np.broadcast_to(np.False_, (count, count))
     return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
                        nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool))
+
+
+def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],
+                  config: LabelConfig) -> tuple[Trajectory, NDArray[np.bool_]]:
+    """
+    Return the nearest pose of every frame, and which frames have one within the tolerance.
+
+    Raises
+    ------
+    EvaluationError
+        None has.
+
+    """
+    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
+    if not located.any():
+        raise EvaluationError(
+            f'none of {len(stamps)} frames has a ground truth pose within '
+            f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
+    return replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
+                   quaternion=trajectory.quaternion[row]), located
 
 
 def relation(rows: Trajectory, image_size: tuple[int, int],
@@ -203,7 +216,7 @@ def relation(rows: Trajectory, image_size: tuple[int, int],
 
     """
     stamps = _checked_stamps(rows.stamp_ns)
-    return _relation(_judge(rows, image_size, config), _candidates(stamps, config.min_gap_s))
+    return _relation(_judge(rows, image_size, config), count_old_enough(stamps, config.min_gap_s))
 
 
 def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
@@ -218,19 +231,9 @@ def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
     return stamps
 
 
-def nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
-                 tolerance_s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """
-    Return the row of the pose nearest to each stamp, and whether it is within the tolerance.
-
-    Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
-
-    Raises
-    ------
-    EvaluationError
-        There is no pose.
-
-    """
+def _nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
+                  tolerance_s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
     if not len(known_ns):
         raise EvaluationError('the ground truth holds no pose: expected at least one')
     after = np.clip(np.searchsorted(known_ns, wanted_ns), 1, max(len(known_ns) - 1, 1))
@@ -241,18 +244,16 @@ def nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
     return row, np.abs(known_ns[row] - wanted_ns) <= round(tolerance_s * 1e9)
 
 
-def _candidates(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
-    # Frames 0 .. k - 1 are at least min_gap_s older; never the frame itself.
+def count_old_enough(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
+    """Return for each frame how many, the first ones, are so much older; never itself."""
     gap_ns = max(round(min_gap_s * 1e9), 1)
     count: NDArray[np.int64] = np.searchsorted(stamps, stamps - gap_ns, side='right')
     return count
 
 
 def _by_evidence(evidence: Evidence) -> _Judgement:
-    near = evidence.loop & evidence.shared & ~evidence.scaled
-    # A camera has left when what it sees is no longer seen at its own scale.
-    return _Judgement(near, evidence.shared, evidence.scaled, evidence.elsewhere,
-                      evidence.elsewhere, ~(evidence.shared & ~evidence.scaled))
+    return _Judgement(evidence.loop, evidence.shared, evidence.scaled, evidence.elsewhere,
+                      evidence.elsewhere, evidence.left)
 
 
 def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -> _Judgement:
@@ -271,6 +272,21 @@ def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -
     possible = mutual >= config.possible_overlap * GRID_POINTS
     return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible, none,
                       ~possible, either < config.negative_overlap * GRID_POINTS, ~possible)
+
+
+def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig
+                 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """
+    Return what poses alone say: which pairs are loops if no wall is between, and which are left.
+
+    Parameters
+    ----------
+    rows, image_size, config
+        See ``relation``.
+
+    """
+    judgement = _judge(rows, image_size, replace(config, rule='overlap'))
+    return judgement.near, judgement.left
 
 
 def _by_distance(rows: Trajectory,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 import shutil
 import time
@@ -133,8 +134,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:
         tell('labels with other thresholds')
-        summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
-                                              plan.labels)
+        label = partial(label_graphs, clean.clean, sequence.trajectory, sequence.source)
+        summary['label_sweep'] = sweep_labels(records, label, plan.labels)
         write_sweep(folder.path / SWEEP, summary['label_sweep'])
     summary['duration_s'] = time.monotonic() - started_s
     _write(folder, plan, summary, records, command_line,
