@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.shared_surface import shared_surface
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
-from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns, text_rows
+from adversarial_lcd_ros.sequences.text_files import text_rows
+from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
 
 DEPTH_ARCHIVE, DEPTH_LIST = 'depth.npz', 'depth.txt'
 # Rays over the frame; more cost time and tell no more.
