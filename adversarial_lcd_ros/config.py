@@ -300,8 +300,19 @@ class LabelConfig(Config):
     title: ClassVar[str] = 'labels'
 
     rule: str = setting(
-        'overlap', 'How two views are judged: by view overlap, or by distance and angle.',
-        choices=('overlap', 'distance'))
+        'overlap', 'How two views are judged: by co-visibility where it lies beside the '
+        'recording, else by an audit (auto); by what can be shown in the pictures under the true '
+        'poses (audit); or from poses alone, by the overlap that they may have (overlap) or by '
+        'distance and angle (distance).', choices=('auto', 'audit', 'overlap', 'distance'))
+    loop_share: float = setting(
+        0.5, 'Auto: least share of a loop, of the surface of either view, that the other sees.',
+        low=0.0, high=1.0)
+    shared_share: float = setting(
+        0.3, 'Auto: least share, of the surface of one of two views, at which a match is right; '
+        'where the other has less in common, it is a change of scale.', low=0.0, high=1.0)
+    elsewhere_share: float = setting(
+        0.1, 'Auto: pairs of which either view shares less are different places, and a match '
+        'that names one is wrong.', low=0.0, high=1.0)
     positive_overlap: float = setting(
         0.6, 'Least view overlap of a loop, seen from both sides.', low=0.0, high=1.0)
     possible_overlap: float = setting(
@@ -340,6 +351,8 @@ class LabelConfig(Config):
         super().__post_init__()
         ascending = (('negative_overlap', 'possible_overlap'),
                      ('possible_overlap', 'positive_overlap'),
+                     ('elsewhere_share', 'shared_share'),
+                     ('shared_share', 'loop_share'),
                      ('positive_distance_m', 'negative_distance_m'),
                      ('positive_angle_deg', 'negative_angle_deg'),
                      ('positive_index', 'negative_index'))

@@ -6,13 +6,15 @@ from test_report import ATTACKS, COUNT, decide, make_labels, make_runs
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import results
 from adversarial_lcd_ros.evaluation.detectors import run as targets
+from adversarial_lcd_ros.evaluation.labels import run as label_runs
+from adversarial_lcd_ros.evaluation.labels.page import PATH, render_page
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
 from adversarial_lcd_ros.evaluation.replay.records import make_records, write_records
 from adversarial_lcd_ros.evaluation.replay.report import write_report
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.evaluation.store import open_store
 
-KINDS = ('replay', 'frames', 'targets')
+KINDS = ('replay', 'frames', 'targets', 'labels')
 
 
 def replay(path, *, found=range(30, 60), lcd=None, labels=None):
@@ -61,6 +63,21 @@ def targets_folder(path, *, accuracy=0.75, lcd=None, labels=None):
     return path
 
 
+def labels_folder(path, *, positive=20, labels=None):
+    """Return the counts of a sequence's labels; ``positive``: its frames with a loop."""
+    made = folder(path, [labels or LabelConfig()])
+    row = {'sequence': 'tour', 'told_by': 'co-visibility', 'focal_length': 0.8,
+           'focal_from': 'the setting', 'frames': 60, 'positive': positive, 'negative': 10,
+           'scale': 2, 'between': 20, 'no_candidate': 8, 'no_ground_truth': 0,
+           'loop_pairs': 40, 'pairs': 900, 'right_pairs': 80, 'scaled_pairs': 4,
+           'wrong_pairs': 700}
+    made.write_json(results.SUMMARY, results.summary_document(
+        label_runs.KIND, label_runs.SCHEMA, [row]))
+    (path / PATH).write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    render_page(path, row)
+    return path
+
+
 def folder(path, sections, extra=None):
     """Return a results folder with settings and versions and nothing else."""
     path.mkdir(parents=True)
@@ -69,4 +86,5 @@ def folder(path, sections, extra=None):
     return made
 
 
-MAKERS = dict(zip(KINDS, (replay, frames, targets_folder), strict=True))
+MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder),
+                  strict=True))

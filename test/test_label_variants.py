@@ -23,6 +23,10 @@ BASE = LabelConfig(min_gap_s=5.0)
 YAW = [*range(0, 360, 30), *range(0, 180, 30)]
 
 
+def by_poses(trajectory):
+    return lambda config: label_frames(trajectory, trajectory.stamp_ns, SIZE, config)
+
+
 @pytest.fixture
 def trajectory():
     return path(YAW)
@@ -50,7 +54,7 @@ def records(trajectory):
 
 
 def test_the_labels_as_set_come_first_and_give_the_decline(records, trajectory):
-    clean, attack = sweep_labels(records, trajectory, SIZE, BASE)[:2]
+    clean, attack = sweep_labels(records, by_poses(trajectory), BASE)[:2]
     assert (clean['labels'], clean['run'], attack['run']) == ('as set', 'clean', 'attack')
     assert clean['balanced_accuracy'] == 1
     assert clean['decline_pp'] == 0
@@ -61,7 +65,8 @@ def test_the_labels_as_set_come_first_and_give_the_decline(records, trajectory):
 
 
 def test_thresholds_change_what_is_counted(records, trajectory):
-    rows = [row for row in sweep_labels(records, trajectory, SIZE, BASE) if row['run'] == 'clean']
+    rows = [row for row in sweep_labels(records, by_poses(trajectory), BASE)
+            if row['run'] == 'clean']
     assert len({row['labels'] for row in rows}) == len(rows)
     assert len({(row['positives'], row['negatives']) for row in rows}) > 1
     late = next(row for row in rows if row['labels'] == 'min_gap_s = 16')
@@ -76,7 +81,7 @@ def test_variants_differ_from_the_base_in_one_setting_and_are_possible():
 
 
 def test_it_is_written_as_csv_and_fits_into_json(records, trajectory, tmp_path):
-    rows = sweep_labels(records, trajectory, SIZE, BASE)
+    rows = sweep_labels(records, by_poses(trajectory), BASE)
     write_sweep(tmp_path / 'sweep.csv', rows)
     assert len((tmp_path / 'sweep.csv').read_text().splitlines()) == len(rows) + 1
     assert json.loads(json.dumps(rows)) == rows

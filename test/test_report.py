@@ -142,7 +142,8 @@ def test_summary_has_the_agreed_fields(summary):
 def test_summary_figures(summary):
     eigen, walk = summary['attacks']
     assert (summary['positives'], summary['negatives']) == (30, 22)
-    assert summary['not_scored'] == {'between': 0, 'no_candidate': 8, 'no_ground_truth': 0}
+    assert summary['not_scored'] == {'scale': 0, 'between': 0, 'no_candidate': 8,
+                                     'no_ground_truth': 0}
     assert (eigen['suppressed'], eigen['diverted'], eigen['invented']) == (6, 1, 1)
     assert eigen['decline_pp'] == pytest.approx(50 * (6 / 30 + 1 / 22))
     assert eigen['decline_ci95'][0] < eigen['decline_pp'] < eigen['decline_ci95'][1]

@@ -22,7 +22,7 @@ from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 Outcomes = NDArray[np.str_]
 # What ground truth says of a frame, in words; only the first two are scored.
-FRAME_KINDS = ('positive', 'negative', 'between', 'no_candidate', 'no_ground_truth')
+FRAME_KINDS = ('positive', 'negative', 'scale', 'between', 'no_candidate', 'no_ground_truth')
 # What an attack did to a frame, by its outcomes before and after.
 EFFECTS = {('TP', 'FN'): 'suppressed', ('TP', 'WM'): 'diverted', ('TN', 'FP'): 'invented',
            ('FN', 'TP'): 'regained', ('WM', 'TP'): 'regained', ('FP', 'TN'): 'withdrawn'}

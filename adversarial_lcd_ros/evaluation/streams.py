@@ -13,7 +13,8 @@ from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, holds_graphs, open_graphs
-from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames
+from adversarial_lcd_ros.ground_truth.labelling import label_graphs
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
 
@@ -139,8 +140,7 @@ def label_sequence(sequence: GraphSequence, config: LabelConfig) -> FrameLabels:
     if sequence.trajectory is None:
         raise EvaluationError(f'{sequence.name} has no ground truth: without it nobody knows '
                               'which decisions are right')
-    labels = label_frames(sequence.trajectory, [graph.stamp_ns for graph in sequence.graphs],
-                          sequence.image_size, config)
+    labels = label_graphs(sequence.graphs, sequence.trajectory, sequence.source, config)
     if not labels.kind.any():
         raise EvaluationError(f'{sequence.name}: none of {len(labels.kind)} frames is a loop or '
                               'a new place: take a longer part, or set labels (min_gap_s is '
@@ -157,7 +157,7 @@ def graphs_digest(graphs: Iterable[MultiTierGraph]) -> str:
 
 
 def _with_labels(graphs: str, labels: FrameLabels) -> str:
-    arrays = (labels.kind, labels.possible, labels.candidates)
+    arrays = (labels.kind, labels.possible, labels.elsewhere, labels.candidates)
     return hashlib.blake2b(graphs.encode() + b''.join(array.tobytes() for array in arrays),
                            digest_size=16).hexdigest()
 

@@ -52,6 +52,8 @@ class GraphSequence:
         Ground truth of the whole sequence; None where it has none.
     image_size : (int, int)
         Width and height, pixels.
+    source : Path
+        What it was opened from.
 
     """
 
@@ -59,6 +61,7 @@ class GraphSequence:
     graphs: list[MultiTierGraph]
     trajectory: Trajectory | None
     image_size: tuple[int, int]
+    source: Path
 
 
 def open_graphs(source: str, config: BuilderConfig | None = None, cache: Path | None = None,
@@ -110,7 +113,7 @@ def open_graphs(source: str, config: BuilderConfig | None = None, cache: Path | 
         progress(len(graphs), len(graphs))
     _warn_without_objects(sequence.name, graphs, config)
     return GraphSequence(_name(sequence.name, numbers, sequence.frame_count), graphs,
-                         sequence.trajectory, sequence.image_size)
+                         sequence.trajectory, sequence.image_size, part.path)
 
 
 def build_graphs(sequence: Sequence, config: BuilderConfig, numbers: range | None = None,
@@ -254,4 +257,4 @@ def _recorded_graphs(part: SequencePart) -> GraphSequence:
     return GraphSequence(_name(part.path.resolve().stem, numbers, len(graphs)),
                          graphs[numbers.start:numbers.stop],
                          bag_trajectory(part.path, np.array([g.stamp_ns for g in graphs]),
-                                        graphs[0].frame_id), sizes[0])
+                                        graphs[0].frame_id), sizes[0], part.path)

@@ -4,11 +4,12 @@ Which frames and pairs of frames are loops, from ground truth only (docs/evaluat
 Two questions are kept apart. A *pair* of frames shows the same place, different places, or
 something between (``relation``, for the pair protocol). A *frame* of a replay has a loop to be
 found among its earlier frames, has none, or lies between (``label_frames``, for the live one).
+What two views share is told by evidence (``evidence``), or guessed from poses (``overlap``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
 
 if TYPE_CHECKING:
@@ -44,6 +46,12 @@ class FrameLabels:
         Of every pair: +1 loop, -1 different places, 0 between, too close in time, or unknown.
     possible : bool, (n, n)
         Pairs that a loop closure may rightly name: the views share enough.
+    elsewhere : bool, (n, n)
+        Pairs that it may certainly not: the views share nothing. What is neither possible nor
+        elsewhere cannot be told.
+    scaled : bool, (n, n)
+        Pairs that are a change of scale: one view holds the other as a small part. Where that
+        is shown, they are possible, too.
     candidates : int64, (n,)
         The frames 0 .. candidates[i] - 1 are old enough to close a loop with frame i.
     located : bool, (n,)
@@ -55,6 +63,8 @@ class FrameLabels:
     kind: NDArray[np.int8]
     relation: NDArray[np.int8]
     possible: NDArray[np.bool_]
+    elsewhere: NDArray[np.bool_]
+    scaled: NDArray[np.bool_]
     candidates: NDArray[np.int64]
     located: NDArray[np.bool_]
 
@@ -62,9 +72,17 @@ class FrameLabels:
     def names(self) -> list[str]:
         """Return the kind of every frame in words, as in per_query.csv."""
         words = np.select(
-            [self.kind == POSITIVE, self.kind == NEGATIVE, ~self.located, self.candidates == 0],
-            ['positive', 'negative', 'no_ground_truth', 'no_candidate'], 'between')
+            [self.kind == POSITIVE, self.kind == NEGATIVE, ~self.located, self.candidates == 0,
+             self.has_scale_only],
+            ['positive', 'negative', 'no_ground_truth', 'no_candidate', 'scale'], 'between')
         return [str(word) for word in words]
+
+    @cached_property
+    def has_scale_only(self) -> NDArray[np.bool_]:
+        """Tell which frames share with old enough ones by changes of scale only, bool (n,)."""
+        old = np.arange(len(self.kind))[None, :] < self.candidates[:, None]
+        at_scale = self.possible & ~self.scaled & old
+        return np.asarray((self.scaled & old).any(axis=1) & ~at_scale.any(axis=1))
 
     def count(self, name: str) -> int:
         """Return the number of frames of a kind in words."""
@@ -74,9 +92,9 @@ class FrameLabels:
         """
         Tell for each query frame whether a closure with the matched frame is right.
 
-        It is unless ground truth contradicts it: the match must be old enough to be a loop and
-        the two views must share enough (``possible``). A match whose view overlap lies between
-        "enough" and "a loop" is right on a frame that has a loop.
+        The match must be old enough to be a loop and the two views must share enough
+        (``possible``). A match that shares less than a loop does is right on a frame that has
+        one.
 
         Parameters
         ----------
@@ -92,23 +110,27 @@ class FrameLabels:
 
 @dataclass(frozen=True, eq=False)
 class _Judgement:
-    # Symmetric (n, n) bool: a loop but for time; may be a loop; certainly another place; a
-    # camera that came from one to the other has left in between.
+    # Symmetric (n, n) bool: a loop but for time; may rightly be named; that by a change of scale;
+    # wrongly named; a pair of different places; a camera that came from one to the other has
+    # left in between.
     near: NDArray[np.bool_]
     possible: NDArray[np.bool_]
+    scaled: NDArray[np.bool_]
+    wrong: NDArray[np.bool_]
     far: NDArray[np.bool_]
     left: NDArray[np.bool_]
 
 
 def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
-                 config: LabelConfig) -> FrameLabels:
+                 config: LabelConfig, evidence: Evidence | None = None) -> FrameLabels:
     """
     Label every frame of a replay for the live protocol.
 
-    Positive: at least one earlier frame makes a loop with it (``relation`` +1). Negative: none
-    of the frames old enough is even a possible loop. All else is not scored: frames between,
-    frames so early that no frame is old enough (silence is trivially right there), and frames
-    without a ground truth pose. Candidates without a pose are ignored.
+    Positive: at least one earlier frame makes a loop with it (``relation`` +1). Negative: every
+    frame old enough would be a wrong match. All else is not scored: frames between, frames of
+    which only a change of scale is known, frames so early that no frame is old enough (silence
+    is trivially right there), and frames without a ground truth pose. Candidates without a pose
+    are ignored.
 
     Parameters
     ----------
@@ -120,6 +142,9 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
         Width and height, pixels.
     config : LabelConfig
         Thresholds.
+    evidence : Evidence, optional
+        Of these frames. Without it poses alone decide, by the rule "distance" where that is
+        chosen and else by "overlap".
 
     Raises
     ------
@@ -128,20 +153,16 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
 
     """
     stamps = _checked_stamps(stamp_ns)
-    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
-    if not located.any():
-        raise EvaluationError(
-            f'none of {len(stamps)} frames has a ground truth pose within '
-            f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
-    rows = replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
-                   quaternion=trajectory.quaternion[row])
-    judgement = _judge(rows, image_size, config)
-    for part in (judgement.near, judgement.possible, judgement.far, judgement.left):
-        part &= located[:, None] & located[None, :]
-    candidates = _candidates(stamps, config.min_gap_s)
+    rows, located = located_poses(trajectory, stamps, config)
+    judgement = (_judge(rows, image_size, config) if evidence is None
+                 else _by_evidence(evidence))
+    known = located[:, None] & located[None, :]
+    judgement = _Judgement(*(getattr(judgement, part.name) & known
+                             for part in fields(judgement)))
+    candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
-    return FrameLabels(stamps, _kinds(pairs, judgement.possible, candidates, located), pairs,
-                       judgement.possible, candidates, located)
+    return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
+                       judgement.possible, judgement.far, judgement.scaled, candidates, located)
 
 
 def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
@@ -151,13 +172,33 @@ def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
     # Views of one value: nothing is known of any pair, and that takes no memory.
     nothing = np.broadcast_to(np.False_, (count, count))
     return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
-                       np.zeros(count, np.int64), np.zeros(count, bool))
+                       nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool))
+
+
+def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],
+                  config: LabelConfig) -> tuple[Trajectory, NDArray[np.bool_]]:
+    """
+    Return the nearest pose of every frame, and which frames have one within the tolerance.
+
+    Raises
+    ------
+    EvaluationError
+        None has.
+
+    """
+    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
+    if not located.any():
+        raise EvaluationError(
+            f'none of {len(stamps)} frames has a ground truth pose within '
+            f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
+    return replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
+                   quaternion=trajectory.quaternion[row]), located
 
 
 def relation(rows: Trajectory, image_size: tuple[int, int],
              config: LabelConfig) -> NDArray[np.int8]:
     """
-    Return how every two frames are related, shape (n, n), symmetric.
+    Return how every two frames are related by their poses, shape (n, n), symmetric.
 
     +1 same place: a loop. The views are near (overlap seen from both sides, distance, angle),
     at least ``min_gap_s`` apart, and the camera looked elsewhere at some time in between.
@@ -175,7 +216,7 @@ def relation(rows: Trajectory, image_size: tuple[int, int],
 
     """
     stamps = _checked_stamps(rows.stamp_ns)
-    return _relation(_judge(rows, image_size, config), _candidates(stamps, config.min_gap_s))
+    return _relation(_judge(rows, image_size, config), count_old_enough(stamps, config.min_gap_s))
 
 
 def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
@@ -203,27 +244,49 @@ def _nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
     return row, np.abs(known_ns[row] - wanted_ns) <= round(tolerance_s * 1e9)
 
 
-def _candidates(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
-    # Frames 0 .. k - 1 are at least min_gap_s older; never the frame itself.
+def count_old_enough(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
+    """Return for each frame how many, the first ones, are so much older; never itself."""
     gap_ns = max(round(min_gap_s * 1e9), 1)
     count: NDArray[np.int64] = np.searchsorted(stamps, stamps - gap_ns, side='right')
     return count
 
 
+def _by_evidence(evidence: Evidence) -> _Judgement:
+    return _Judgement(evidence.loop, evidence.shared, evidence.scaled, evidence.elsewhere,
+                      evidence.elsewhere, evidence.left)
+
+
 def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -> _Judgement:
+    none = np.zeros((len(rows.position),) * 2, bool)
     if rows.frame_id == PLACE_INDEX:
         apart = np.abs(rows.position[:, :1] - rows.position[:, 0])
         possible = apart < config.negative_index
-        return _Judgement(apart <= config.positive_index, possible, ~possible, ~possible)
+        return _Judgement(apart <= config.positive_index, possible, none, ~possible, ~possible,
+                          ~possible)
     near, far = _by_distance(rows, config)
     if config.rule == 'distance':
         # Within a room a camera is never far by this rule: to leave is to be no longer near.
-        return _Judgement(near, ~far, far, ~near)
+        return _Judgement(near, ~far, none, far, far, ~near)
     seen = visible_points(rows.position, rows.quaternion, image_size, config.focal_length)
     mutual, either = np.minimum(seen, seen.T), np.maximum(seen, seen.T)
     possible = mutual >= config.possible_overlap * GRID_POINTS
-    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible,
-                      either < config.negative_overlap * GRID_POINTS, ~possible)
+    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible, none,
+                      ~possible, either < config.negative_overlap * GRID_POINTS, ~possible)
+
+
+def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig
+                 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """
+    Return what poses alone say: which pairs are loops if no wall is between, and which are left.
+
+    Parameters
+    ----------
+    rows, image_size, config
+        See ``relation``.
+
+    """
+    judgement = _judge(rows, image_size, replace(config, rule='overlap'))
+    return judgement.near, judgement.left
 
 
 def _by_distance(rows: Trajectory,
@@ -259,11 +322,11 @@ def _relation(judgement: _Judgement, candidates: NDArray[np.int64]) -> NDArray[n
     return symmetric
 
 
-def _kinds(pairs: NDArray[np.int8], possible: NDArray[np.bool_], candidates: NDArray[np.int64],
+def _kinds(pairs: NDArray[np.int8], wrong: NDArray[np.bool_], candidates: NDArray[np.int64],
            located: NDArray[np.bool_]) -> NDArray[np.int8]:
     old_enough = np.arange(len(candidates))[None, :] < candidates[:, None]
-    known = (old_enough & located[None, :]).any(axis=1) & located
+    asked = old_enough & located[None, :]
     kind: NDArray[np.int8] = np.zeros(len(candidates), np.int8)
-    kind[known & ~(possible & old_enough).any(axis=1)] = NEGATIVE
+    kind[asked.any(axis=1) & located & (wrong | ~asked).all(axis=1)] = NEGATIVE
     kind[((pairs == POSITIVE) & old_enough).any(axis=1)] = POSITIVE
     return kind

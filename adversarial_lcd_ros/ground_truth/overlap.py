@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,12 @@ _BLOCK_VALUES = 1 << 19
 
 
 def visible_points(position: NDArray[np.float64], quaternion: NDArray[np.float64],
-                   image_size: tuple[int, int], focal_length: float) -> NDArray[np.uint8]:
+                   image_size: tuple[int, int], focal_length: float,
+                   depths_m: Sequence[float] = DEPTHS_M) -> NDArray[np.uint8]:
     """
     Return how many grid points of view i camera j sees, shape (n, n), 0 to GRID_POINTS.
 
-    The pixels of a 9 x 7 grid over view i are put at 1, 2 and 4 m depth and projected into
+    The pixels of a 9 x 7 grid over view i are put at some depths and projected into
     view j; the depth at which most of them fall into its image counts. Without a depth image
     the true depth is unknown: the largest share is what the views could have in common.
     Divided by GRID_POINTS this is the directed view overlap; memory is n^2 bytes.
@@ -37,6 +39,8 @@ def visible_points(position: NDArray[np.float64], quaternion: NDArray[np.float64
         Width and height, pixels.
     focal_length : float
         Focal length over the image width; square pixels, central principal point.
+    depths_m : sequence of float
+        Metres.
 
     """
     count = len(position)
@@ -48,7 +52,7 @@ def visible_points(position: NDArray[np.float64], quaternion: NDArray[np.float64
     rows = max(1, _BLOCK_VALUES // (GRID_POINTS * max(count, 1)))
     for start in range(0, count, rows):
         block = slice(start, min(start + rows, count))
-        for depth in DEPTHS_M:
+        for depth in depths_m:
             point = centre[block, None, :] + depth * ray[block].transpose(0, 2, 1)
             np.maximum(best[block], _seen(point.astype(np.float32), projection), out=best[block])
     return best

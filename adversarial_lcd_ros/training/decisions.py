@@ -18,7 +18,7 @@ from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import Progress
-from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.ground_truth.labelling import label_graphs
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.defences import make_defences
@@ -51,12 +51,15 @@ class TrainingSequence:
         In order of time.
     trajectory : Trajectory
         Ground truth.
+    source : Path
+        What the sequence was opened from.
 
     """
 
     name: str
     graphs: Sequence[MultiTierGraph]
     trajectory: Trajectory
+    source: Path
 
 
 def training_pairs(sequence: TrainingSequence, labels: LabelConfig, count: int,
@@ -74,8 +77,7 @@ def training_pairs(sequence: TrainingSequence, labels: LabelConfig, count: int,
 
     """
     graphs = sequence.graphs
-    found = label_frames(sequence.trajectory, [graph.stamp_ns for graph in graphs],
-                         (graphs[0].width, graphs[0].height), labels)
+    found = label_graphs(graphs, sequence.trajectory, sequence.source, labels)
     lower = np.tril(found.relation, -1)
     available = min(int((lower == 1).sum()), int((lower == -1).sum()))
     if not available:

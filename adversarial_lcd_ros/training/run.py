@@ -233,7 +233,8 @@ def _build_graphs(source: TrainingFrames, config: BuilderConfig, stage: Stage
         graphs = [builder.build(frame.image(), frame.stamp_ns, sequence=number)
                   for number, frame in zip(source.numbers, _counted(
                       source.frames(), len(source.numbers), progress), strict=True)]
-    return TrainingSequence(f'{source.name} ({source.licence})', graphs, source.trajectory)
+    return TrainingSequence(f'{source.name} ({source.licence})', graphs, source.trajectory,
+                            source.source.path)
 
 
 def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, seed: int,

@@ -14,6 +14,7 @@ from pathlib import Path
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
 from adversarial_lcd_ros.evaluation.kinds.frames import FramesResults
+from adversarial_lcd_ros.evaluation.kinds.labels import LabelsResults
 from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
 from adversarial_lcd_ros.evaluation.kinds.targets import TargetsResults
 from adversarial_lcd_ros.evaluation.results import (
@@ -24,7 +25,7 @@ from adversarial_lcd_ros.evaluation.results import (
 )
 
 KINDS: Mapping[str, ResultsKind] = {kind.name: kind for kind in (
-    ReplayResults(), FramesResults(), TargetsResults())}
+    ReplayResults(), FramesResults(), TargetsResults(), LabelsResults())}
 
 
 def is_results(path: Path) -> bool:

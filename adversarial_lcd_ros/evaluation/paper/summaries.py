@@ -39,7 +39,7 @@ USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
           'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
           'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
-_KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0), strict=True))
+_KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
 Cell = dict[str, Any]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,13 @@ from adversarial_lcd_ros.ground_truth.labels import (
     NO_MATCH,
     POSITIVE,
     FrameLabels,
-    label_frames,
 )
-from adversarial_lcd_ros.sequences import Trajectory
 
 SWEEP = 'label_sweep.csv'
 # One threshold at a time, the others as they are.
 _GRID: Mapping[str, tuple[float, ...]] = {
     'positive_overlap': (0.45, 0.5, 0.7, 0.8), 'possible_overlap': (0.2, 0.3, 0.5),
+    'loop_share': (0.4, 0.7), 'elsewhere_share': (0.05, 0.2),
     'min_gap_s': (4.0, 12.0, 16.0), 'positive_distance_m': (0.3, 1.0),
     'positive_angle_deg': (15.0, 40.0)}
 
@@ -47,8 +46,8 @@ def label_variants(base: LabelConfig) -> Iterator[tuple[str, LabelConfig]]:
     yield f'rule = {other}', replace(base, rule=other)
 
 
-def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
-                 image_size: tuple[int, int], base: LabelConfig) -> list[dict[str, Any]]:
+def sweep_labels(records: Sequence[QueryRecord], label: Callable[[LabelConfig], FrameLabels],
+                 base: LabelConfig) -> list[dict[str, Any]]:
     """
     Return the figures of every run under every variant of the labels.
 
@@ -56,9 +55,8 @@ def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
     ----------
     records : sequence of QueryRecord
         Of the clean run and the attacks.
-    trajectory : Trajectory
-    image_size : (int, int)
-        Width and height, pixels.
+    label : callable
+        Returns the labels of the frames by some settings.
     base : LabelConfig
 
     Returns
@@ -69,10 +67,9 @@ def sweep_labels(records: Sequence[QueryRecord], trajectory: Trajectory,
 
     """
     runs = runs_of(records)
-    stamps = column(runs[CLEAN], 'stamp_ns')
     rows = []
     for title, config in label_variants(base):
-        labels = label_frames(trajectory, stamps, image_size, config)
+        labels = label(config)
         outcome = {name: _outcomes(labels, run) for name, run in runs.items()}
         for name, found in outcome.items():
             change = effect(labels.kind, outcome[CLEAN], found)

@@ -29,7 +29,8 @@ from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
-from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
+from adversarial_lcd_ros.ground_truth.labelling import label_graphs
+from adversarial_lcd_ros.ground_truth.labels import unlabelled
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bag_truth import BagTruth
@@ -189,9 +190,9 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
     notes = [*heard.notes, _agreement(run, lcd)]
     for note in notes:
         tell(note)
-    stamps = [graph.stamp_ns for graph in run.clean]
-    found = (unlabelled(stamps) if sequence.trajectory is None else
-             label_frames(sequence.trajectory, stamps, sequence.image_size, labels))
+    found = (unlabelled([graph.stamp_ns for graph in run.clean])
+             if sequence.trajectory is None else
+             label_graphs(run.clean, sequence.trajectory, sequence.source, labels))
     records = make_records(found, clean, {RECORDED: AttackRun(run.decisions, run.reports)})
     if not heard.has_reports:
         records = [replace(record, status=None, edit_budget=None, query_budget=None, queries=None,
@@ -226,7 +227,7 @@ def _sequence(bag: Path, run: Recording, source: dict[str, Any],
         truth = BagTruth(opened, stamps, ('', first.frame_id), source.get('truth'),
                          source.get('stamps')).find(source.get('ground_truth'))
     return GraphSequence(bag.resolve().stem, run.clean, truth.trajectory,
-                         (first.width, first.height))
+                         (first.width, first.height), bag)
 
 
 def _agreement(run: Recording, lcd: LcdConfig) -> str:

@@ -48,7 +48,7 @@ class QueryRecord:
     stamp_ns : int
         Of the frame.
     kind : str
-        positive, negative, between, no_candidate, no_ground_truth.
+        positive, negative, scale, between, no_candidate, no_ground_truth.
     probability, is_loop, candidates
         The detector's decision.
     match_frame : int or None

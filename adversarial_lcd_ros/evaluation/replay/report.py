@@ -36,7 +36,8 @@ from adversarial_lcd_ros.files.writing import write_text
 
 _KIND_TEXT = (('positive', 'a loop is there to be found'),
               ('negative', 'a new place: no loop is there'),
-              ('between', 'between the two: not scored'),
+              ('scale', 'seen before from nearer or further only: not scored'),
+              ('between', 'between the two, or cannot be told: not scored'),
               ('no_candidate', 'too early: no frame is old enough'),
               ('no_ground_truth', 'no ground truth pose'))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 import shutil
 import time
@@ -52,7 +53,8 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     holds_graphs,
     open_graphs,
 )
-from adversarial_lcd_ros.ground_truth.labels import FrameLabels, label_frames, unlabelled
+from adversarial_lcd_ros.ground_truth.labelling import label_graphs
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, unlabelled
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
@@ -166,8 +168,8 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:
-        summary['label_sweep'] = sweep_labels(records, sequence.trajectory, sequence.image_size,
-                                              plan.labels)
+        label = partial(label_graphs, clean.clean, sequence.trajectory, sequence.source)
+        summary['label_sweep'] = sweep_labels(records, label, plan.labels)
     return records, summary
 
 
@@ -186,10 +188,9 @@ def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
 
 def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
             plan: Plan) -> FrameLabels:
-    stamps = [graph.stamp_ns for graph in clean.clean]
     if sequence.trajectory is None:
-        return unlabelled(stamps)
-    return label_frames(sequence.trajectory, stamps, sequence.image_size, plan.labels)
+        return unlabelled([graph.stamp_ns for graph in clean.clean])
+    return label_graphs(clean.clean, sequence.trajectory, sequence.source, plan.labels)
 
 
 def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:

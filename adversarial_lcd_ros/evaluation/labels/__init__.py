@@ -1,0 +1,1 @@
+"""Labels of a sequence, shown before anything is evaluated."""

@@ -1,0 +1,93 @@
+"""What an audit counted, kept on disk under a digest of everything that it was made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import hashlib
+import os
+from pathlib import Path
+import tempfile
+from typing import TYPE_CHECKING
+from zipfile import BadZipFile
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.ground_truth.audit import Sightings
+from adversarial_lcd_ros.ground_truth.focal import Focal
+from adversarial_lcd_ros.paths import cache_folder
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.sequences import Trajectory
+
+_HERE = Path(__file__).resolve().parent
+_CODE = (*sorted(_HERE.glob('*.py')), _HERE.parent / 'compiled' / 'sightings.py',
+         _HERE.parent / 'vision' / 'features.py')
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """Counts of every pair of views, and the focal length that they were made with."""
+
+    sightings: Sightings
+    focal: Focal
+
+
+def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
+              located: NDArray[np.bool_], first: bytes, focal_length: float) -> str:
+    """
+    Return a digest of all that an audit is made of, hexadecimal.
+
+    The source, stamps and poses of the frames, which of them are compared, the first picture as
+    recorded, the code, and the libraries below it.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    arrays = (rows.stamp_ns, rows.position, rows.quaternion, candidates, located)
+    versions = f'{source.resolve()} {focal_length} {np.__version__} {cv2.__version__}'.encode()
+    for part in (versions, first, *(array.tobytes() for array in arrays),
+                 *(path.read_bytes() for path in _CODE)):
+        # With its length, so that no two lists of parts run into the same bytes.
+        digest.update(len(part).to_bytes(8, 'little') + part)
+    return digest.hexdigest()
+
+
+def load(key: str) -> Audit | None:
+    """Return what was kept under a key; None if nothing was, or it is damaged."""
+    try:
+        with np.load(_path(key), allow_pickle=False) as arrays:
+            return Audit(Sightings(arrays['count'].astype(np.int32), arrays['features'],
+                                   arrays['covered']),
+                         Focal(float(arrays['focal']), str(arrays['focal_from'])))
+    except (OSError, EOFError, KeyError, ValueError, BadZipFile):
+        return None
+
+
+def save(key: str, audit: Audit) -> None:
+    """
+    Keep an audit under its key; the file appears when it is complete, or not at all.
+
+    Raises
+    ------
+    EvaluationError
+        The place cannot be written.
+
+    """
+    path = _path(key)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix='.labels-', dir=path.parent) as hidden:
+            work = Path(hidden) / path.name
+            np.savez_compressed(work, count=audit.sightings.count.astype(np.uint16),
+                                features=audit.sightings.features,
+                                covered=audit.sightings.covered,
+                                focal=audit.focal.share, focal_from=audit.focal.source)
+            os.replace(work, path)
+    except OSError as error:
+        raise EvaluationError(f'labels cannot be kept in {path.parent} ({error}): set '
+                              'ADVERSARIAL_LCD_CACHE to another folder') from error
+
+
+def _path(key: str) -> Path:
+    return cache_folder() / 'labels' / f'{key}.npz'

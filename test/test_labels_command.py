@@ -1,0 +1,67 @@
+"""The command "labels": a folder that shows labels before anything is evaluated."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros.cli import main
+
+
+@pytest.fixture
+def sequence(tmp_path):
+    """Write a walk of 24 frames that returns to where it started; co-visibility tells so."""
+    folder = tmp_path / 'walk'
+    (folder / 'rgb').mkdir(parents=True)
+    rng = np.random.default_rng(0)
+    rows, poses = [], []
+    for frame in range(24):
+        cv2.imwrite(str(folder / 'rgb' / f'{frame}.png'),
+                    rng.integers(0, 256, (48, 64, 3), np.uint8))
+        rows.append(f'{frame}.0 rgb/{frame}.png\n')
+        poses.append(f'{frame}.0 {0.2 * (frame % 12):g} 0 0 0 0 0 1\n')
+    (folder / 'rgb.txt').write_text(''.join(rows))
+    (folder / 'groundtruth.txt').write_text(''.join(poses))
+    place = np.arange(24) % 12
+    np.savez(folder / 'covisibility.npz', timestamp=np.arange(24, dtype=float),
+             percent=np.where(place[:, None] == place[None], 90, 0).astype(np.uint8))
+    return folder
+
+
+def test_counts_path_and_pairs_are_written(sequence, tmp_path, monkeypatch):
+    monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path / 'cache'))
+    out = tmp_path / 'out'
+    assert main(['labels', str(sequence), '--label-rule', 'auto', '--output', str(out)]) == 0
+    summary = json.loads((out / 'summary.json').read_text())
+    assert (summary['kind'], summary['schema']) == ('labels', 1)
+    row, = summary['rows']
+    assert row['told_by'] == 'co-visibility'
+    assert (row['positive'], row['negative'], row['no_candidate']) == (12, 4, 8)
+    page = (out / 'report.html').read_text()
+    assert 'co-visibility' in page
+    assert page.count('data:image/jpeg') == len(list(out.glob('*_*_*.jpg'))) == 10
+    assert (out / 'positive_12_0.jpg').is_file()
+    (out / 'report.html').unlink()
+    assert main(['report', str(out)]) == main(['inspect', str(out)]) == 0
+    assert (out / 'report.html').read_text() == page
+
+
+def test_check_holds_a_rule_against_the_exact_shares(sequence, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path / 'cache'))
+    out = tmp_path / 'out'
+    assert main(['labels', str(sequence), '--check', '--label-rule', 'overlap',
+                 '--output', str(out)]) == 0
+    check = json.loads((out / 'summary.json').read_text())['rows'][0]['check']
+    assert check['rule'] == 'overlap'
+    assert check['exactly_new'] == 4
+    # By poses alone the frames of a straight walk see what those before them saw.
+    assert check['right_pairs_elsewhere'] > 0.5
+    assert 'right pairs elsewhere' in capsys.readouterr().out
+
+
+def test_without_exact_shares_there_is_nothing_to_check(sequence, tmp_path, capsys):
+    (sequence / 'covisibility.npz').unlink()
+    assert main(['labels', str(sequence), '--check', '--label-rule', 'overlap',
+                 '--output', str(tmp_path / 'out')]) == 2
+    assert 'no covisibility.npz' in capsys.readouterr().err
