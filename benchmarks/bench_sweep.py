@@ -8,7 +8,7 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
-from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
+from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
 from adversarial_lcd_ros.evaluation.store import open_store
 from adversarial_lcd_ros.evaluation.streams import open_streams
 from adversarial_lcd_ros.evaluation.workers import local_workers
@@ -21,22 +21,22 @@ SEARCHES = {'eigencentrality': {'search': 'stepwise', 'perturbation': 'eigencent
 JOBS = len(os.sched_getaffinity(0))
 
 
-def run(sweep, folder, jobs):
-    """Return the rows of a sweep, and its time by the clock."""
+def run(experiment, folder, jobs):
+    """Return the rows of an experiment, and its time by the clock."""
     started = time.perf_counter()
     with open_store(folder) as store, local_workers(jobs) as workers:
-        rows = run_sweep(sweep, store, workers, lambda cells, share: None)
+        rows = run_experiment(experiment, store, workers, lambda cells, share: None)
     return rows, time.perf_counter() - started
 
 
 @pytest.fixture(scope='module')
-def sweep(tour, tmp_path_factory):
+def experiment(tour, tmp_path_factory):
     # Of 1000 features a frame takes half a minute: those are left to the whole recipe.
     cells = [replace(cell, seeds=1, frames=FRAMES) for cell in load_cells('paper', {})
              if cell.nodes in SIZES]
     streams = open_streams([str(tour.source)], SIZES, BuilderConfig(), LabelConfig(),
                            tmp_path_factory.mktemp('graphs'), lambda *_: None)
-    return plan_sweep(streams, cells, LcdConfig())
+    return plan_experiment(streams, cells, LcdConfig())
 
 
 def spent_s(rows, parts=('query_s', 'search_s', 'judge_s'), **settings):
@@ -46,10 +46,10 @@ def spent_s(rows, parts=('query_s', 'search_s', 'judge_s'), **settings):
     return sum(row[part] for row in here for part in parts) / sum(row['frames'] for row in here)
 
 
-def test_recipe(measured, sweep, tmp_path):
-    rows, alone_s = run(sweep, tmp_path / 'alone', 1)
-    again, together_s = run(sweep, tmp_path / 'together', JOBS)
-    assert len(again) == len(rows) == len(sweep.keys)
+def test_recipe(measured, experiment, tmp_path):
+    rows, alone_s = run(experiment, tmp_path / 'alone', 1)
+    again, together_s = run(experiment, tmp_path / 'together', JOBS)
+    assert len(again) == len(rows) == len(experiment.keys)
     measured('sweep', f'paper recipe without n = 1000, one sequence, {FRAMES} + {FRAMES} frames, '
              f'{len(rows)} cells, {JOBS} processes, a cell', together_s / len(rows),
              'one process', alone_s / len(rows))

@@ -8,7 +8,7 @@ import cv2
 from graph_factory import make_graph
 import numpy as np
 import pytest
-from sweep_factory import walk_folder
+from walk_factory import walk_folder
 
 from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig

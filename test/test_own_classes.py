@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from sweep_factory import walk_folder
+from walk_factory import walk_folder
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError

@@ -4,7 +4,7 @@ from contextlib import contextmanager
 import json
 
 import pytest
-from sweep_factory import walk_folder
+from walk_factory import walk_folder
 
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError

@@ -1,4 +1,4 @@
-"""adversarial-lcd evaluate and demo: a bag replayed clean and attacked, or a sweep."""
+"""adversarial-lcd evaluate and demo: a bag replayed clean and attacked, or an experiment."""
 
 from __future__ import annotations
 

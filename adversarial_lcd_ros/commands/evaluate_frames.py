@@ -24,7 +24,7 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 
 if TYPE_CHECKING:
-    from adversarial_lcd_ros.evaluation.frames.run import Sweep
+    from adversarial_lcd_ros.evaluation.frames.run import Experiment
     from adversarial_lcd_ros.evaluation.store import Row
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
@@ -55,9 +55,9 @@ def refuse_options(options: Namespace) -> None:
 
 def run(options: Namespace) -> None:
     """Run the recipe, or what is left of it, and write the report."""
-    from adversarial_lcd_ros.evaluation.frames.pictures import sweep_pictures
+    from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
     from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
-    from adversarial_lcd_ros.evaluation.frames.run import plan_sweep, run_sweep
+    from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
     from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
@@ -70,17 +70,17 @@ def run(options: Namespace) -> None:
     folder = _folder(options)
     with open_store(folder) as store:
         streams = _open(options, sorted({cell.nodes for cell in cells}))
-        sweep = plan_sweep(streams, cells, lcd, list(store.rows))
+        experiment = plan_experiment(streams, cells, lcd, list(store.rows))
         _write_setup(folder, options, streams, [asdict(cell) for cell in cells])
-        _announce(options, streams, sweep, len(store.rows) - sweep.finished)
+        _announce(options, streams, experiment, len(store.rows) - experiment.finished)
         try:
-            with _workers(options) as workers, _bar(sweep) as progress:
-                rows = run_sweep(sweep, store, workers, progress)
+            with _workers(options) as workers, _bar(experiment) as progress:
+                rows = run_experiment(experiment, store, workers, progress)
         except KeyboardInterrupt:
             tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
                  'there')
             raise
-        write_pictures(folder, sweep_pictures(streams, cells, rows, lcd))
+        write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
         report = write_paper_report(folder, rows)
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
@@ -153,19 +153,21 @@ def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
     results.write_json(f'{Path(ENVIRONMENT).stem}-{versions_digest()}.json', environment())
 
 
-def _announce(options: Namespace, streams: list[Stream], sweep: Sweep, others: int) -> None:
+def _announce(options: Namespace, streams: list[Stream], experiment: Experiment,
+              others: int) -> None:
     for stream in {stream.name: stream for stream in streams}.values():
         tell(f'{stream.name}: {stream.labels.count("positive")} frames with a loop, '
              f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}')
     if others:
         tell('cells finished earlier that are of other settings, graphs, models or code: '
              f'{others}; kept, but not in the report')
-    left = len(sweep.keys) - sweep.finished
-    where = (f'the workers of {options.scheduler}: {sweep.cost_s / 60:.0f} min of one core'
+    left = len(experiment.keys) - experiment.finished
+    minutes = experiment.cost_s / 60
+    where = (f'the workers of {options.scheduler}: {minutes:.0f} min of one core'
              if options.scheduler else
-             f'{_jobs(options)} processes: about {sweep.cost_s / _jobs(options) / 60:.0f} min')
-    tell(f'{left} of {len(sweep.keys)} cells to run on {where}' if left else
-         f'all {len(sweep.keys)} cells are finished')
+             f'{_jobs(options)} processes: about {minutes / _jobs(options):.0f} min')
+    tell(f'{left} of {len(experiment.keys)} cells to run on {where}' if left else
+         f'all {len(experiment.keys)} cells are finished')
 
 
 def _jobs(options: Namespace) -> int:
@@ -182,7 +184,7 @@ def _workers(options: Namespace) -> AbstractContextManager[Run]:
 
 
 @contextmanager
-def _bar(sweep: Sweep) -> Iterator[Callable[[float, float], None]]:
+def _bar(experiment: Experiment) -> Iterator[Callable[[float, float], None]]:
     """Show cells and time left; the time by the expected costs, the cells as they are counted."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
@@ -191,7 +193,7 @@ def _bar(sweep: Sweep) -> Iterator[Callable[[float, float], None]]:
     with Progress(count, BarColumn(), TextColumn('{task.percentage:.0f} %'), TimeElapsedColumn(),
                   TextColumn('left'), TimeLeftColumn(), console=make_console(stderr=True),
                   speed_estimate_period=600) as bar:
-        task = bar.add_task('', total=1.0, cells=sweep.finished, all=len(sweep.keys))
+        task = bar.add_task('', total=1.0, cells=experiment.finished, all=len(experiment.keys))
         yield lambda cells, share: bar.update(task, completed=share, cells=cells)
 
 

@@ -1,4 +1,4 @@
-"""The sequences of a sweep: labels and a digest here, graphs where they are attacked."""
+"""The sequences of an experiment: labels and a digest here, graphs where they are attacked."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def load_stream_graphs(source: GraphSource) -> tuple[MultiTierGraph, ...]:
     """
     graphs = tuple(open_graphs(source.source, source.builder, source.cache).graphs)
     if graphs_digest(graphs) != source.digest:
-        raise EvaluationError(f'{source.source} gives other graphs here than where the sweep was '
-                              'started: expected the same files, vocabulary and releases of the '
-                              'libraries on every machine')
+        raise EvaluationError(f'{source.source} gives other graphs here than where the '
+                              'experiment was started: expected the same files, vocabulary '
+                              'and releases of the libraries on every machine')
     return graphs

@@ -1,4 +1,4 @@
-"""Pictures of a sweep: the frames that the strongest attack turned over, attacked once more."""
+"""Frames that the strongest attack of an experiment turned over: attacked again, and drawn."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ _log = logging.getLogger(__name__)
 _Chosen = tuple[Row, dict[str, Any]]
 
 
-def sweep_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Sequence[Row],
-                   lcd: LcdConfig, count: int = PICTURES) -> list[Picture]:
+def attacked_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Sequence[Row],
+                      lcd: LcdConfig, count: int = PICTURES) -> list[Picture]:
     """
     Return query, match and attacked graph of frames that the strongest attack turned over.
 
@@ -51,9 +51,9 @@ def sweep_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Seque
     Parameters
     ----------
     streams, cells, lcd
-        Of the sweep.
+        Of the experiment.
     rows : sequence of dict
-        Of the sweep.
+        Of the experiment.
     count : int
         Most pictures.
 

@@ -1,5 +1,5 @@
 """
-Sweeps: the cells of a recipe on several sequences with many seeds, side by side, resumable.
+Experiments: the cells of a recipe on several sequences with many seeds, side by side, resumable.
 
 A task is some cells of one sequence and seed, walked together (``frames``). Tasks know nothing of
 each other; finished rows go to cells.jsonl at once, and what is there is not run again.
@@ -39,9 +39,8 @@ FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
 # Seconds on one core (docs/evaluation.md): of a frame and of a walk; classes say the rest of them.
-# They only tell how long a sweep may take.
+# They only tell how long an experiment may take.
 _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
-
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,7 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Experiment:
     """
     What there is to do, and what is done already.
 
@@ -101,12 +100,12 @@ class Sweep:
         return sum(task.cost_s for task in self.tasks)
 
 
-def plan_sweep(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdConfig,
-               finished: Sequence[str] = (), first_seed: int = FIRST_SEED) -> Sweep:
+def plan_experiment(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdConfig,
+                    finished: Sequence[str] = (), first_seed: int = FIRST_SEED) -> Experiment:
     """
-    Cut a sweep into tasks.
+    Cut an experiment into tasks.
 
-    Seed by seed, so that a sweep that is broken off has all sequences and attacks with fewer
+    Seed by seed, so that an experiment that is broken off has all sequences and attacks with fewer
     seeds.
 
     Parameters
@@ -133,7 +132,7 @@ def plan_sweep(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdConfig,
             named = [(cell_key(cell, seed, stream.digest, lcd), cell) for cell in here]
             keys += [key for key, _ in named]
             tasks += _tasks(stream, [entry for entry in named if entry[0] not in done], lcd, seed)
-    return Sweep(tuple(keys), tuple(tasks), sum(key in done for key in keys))
+    return Experiment(tuple(keys), tuple(tasks), sum(key in done for key in keys))
 
 
 def _tasks(stream: Stream, named: Sequence[tuple[str, Cell]], lcd: LcdConfig,
@@ -172,14 +171,14 @@ def _expected_s(cell: Cell, nodes: float) -> float:
     return _FRAME_S + asked * share * query_s * nodes / _NODES
 
 
-def run_sweep(sweep: Sweep, store: CellStore, run: Run,
-              progress: Callable[[float, float], None]) -> list[Row]:
+def run_experiment(experiment: Experiment, store: CellStore, run: Run,
+                   progress: Callable[[float, float], None]) -> list[Row]:
     """
-    Run the tasks of a sweep; return the rows of all its cells, those of earlier runs included.
+    Run the tasks of an experiment; return the rows of all cells, those of earlier runs, too.
 
     Parameters
     ----------
-    sweep : Sweep
+    experiment : Experiment
     store : CellStore
         Gets each row as it comes.
     run : callable
@@ -193,20 +192,20 @@ def run_sweep(sweep: Sweep, store: CellStore, run: Run,
         A worker was lost, an attack overspent its budget, or the rows cannot be written.
 
     """
-    _check_rows(sweep, store)
-    done_s, finished = 0.0, sweep.finished
-    whole_s = sweep.cost_s or 1.0
-    for rows, cost_s in run(run_task, sweep.tasks):
+    _check_rows(experiment, store)
+    done_s, finished = 0.0, experiment.finished
+    whole_s = experiment.cost_s or 1.0
+    for rows, cost_s in run(run_task, experiment.tasks):
         for key, row in rows:
             store.add(key, row)
         done_s, finished = done_s + cost_s, finished + len(rows)
         progress(finished, done_s / whole_s)
-    return [store.rows[key] for key in sweep.keys]
+    return [store.rows[key] for key in experiment.keys]
 
 
-def _check_rows(sweep: Sweep, store: CellStore) -> None:
-    store.check(sweep.keys, ROW_COLUMNS)
-    for key in sweep.keys:
+def _check_rows(experiment: Experiment, store: CellStore) -> None:
+    store.check(experiment.keys, ROW_COLUMNS)
+    for key in experiment.keys:
         if key in store.rows and not are_frames(store.rows[key]['frame_results']):
             raise EvaluationError(f'{store.path}, cell {key}: frame_results are not of frames: '
                                   'delete the line, and its cell runs again')

@@ -14,7 +14,7 @@ from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_of
 from adversarial_lcd_ros.evaluation.paper.plots import Curve
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     USUAL,
-    Cell,
+    Summary,
     frame_right,
     summarise_methods,
 )
@@ -47,7 +47,7 @@ class TargetMap:
     attacks: tuple[str, ...]
     targets: tuple[str, ...]
     declines: NDArray[np.float64]
-    setting: Cell
+    setting: Summary
     transfer: bool
 
 
@@ -101,7 +101,7 @@ def _share_within(queries: NDArray[np.float64],
     return np.asarray(reached / max(len(queries), 1), np.float64)
 
 
-def target_map(cells: Sequence[Cell], ratio: float) -> TargetMap | None:
+def target_map(cells: Sequence[Summary], ratio: float) -> TargetMap | None:
     """
     Return the mean declines of attacks by target, with those that asked another target.
 
@@ -138,7 +138,7 @@ def target_map(cells: Sequence[Cell], ratio: float) -> TargetMap | None:
                      bool(moved))
 
 
-def _comparable(cells: Sequence[Cell]) -> list[Cell]:
+def _comparable(cells: Sequence[Summary]) -> list[Summary]:
     # Of the commonest setting, on the sequences that all targets have.
     counts = Counter(tuple(cell[name] for name in _SHARED) for cell in cells)
     shared = max(counts, key=lambda key: (counts[key], str(key)), default=None)
@@ -150,13 +150,13 @@ def _comparable(cells: Sequence[Cell]) -> list[Cell]:
             if all(cell['sequence'] in sequences for sequences in by_target.values())]
 
 
-def _attack(method: Cell) -> str:
+def _attack(method: Summary) -> str:
     if is_yardstick(method):
         return 'optimum (yardstick)'
     return wording.attack_title({**method, 'name': None})
 
 
-def optimum_shares(cells: Sequence[Cell], setting: Cell,
+def optimum_shares(cells: Sequence[Summary], setting: Summary,
                    ratio: float) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
     """
     Return attack to sequence to share of the optimum's decline, and attack to its method.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.paper.summaries import KIND, SCHEMA, Cell
+from adversarial_lcd_ros.evaluation.paper.summaries import KIND, SCHEMA, Summary
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable, Line
 from adversarial_lcd_ros.evaluation.results import SUMMARY, summary_document
 from adversarial_lcd_ros.evaluation.store import Row
@@ -24,7 +24,7 @@ _TEX_HEAD = """\
 """
 
 
-def write_exports(folder: Path, rows: Sequence[Row], cells: Sequence[Cell],
+def write_exports(folder: Path, rows: Sequence[Row], cells: Sequence[Summary],
                   tables: Sequence[DeclineTable]) -> list[Path]:
     """
     Write summary.json, summary.csv, cells.csv and tables.tex; return their paths.
@@ -75,7 +75,7 @@ def latex_table(table: DeclineTable) -> str:
             f'{body}\n\\bottomrule\n\\end{{tabular}}\n\\end{{table}}\n')
 
 
-def _latex_line(line: Line, strongest: Cell | None) -> str:
+def _latex_line(line: Line, strongest: Summary | None) -> str:
     cells = [latex_escape(line.title), latex_escape(wording.percent(line.before))]
     for entry in line.entries:
         value = None if entry is None else entry['decline_pp']

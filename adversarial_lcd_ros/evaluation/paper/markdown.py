@@ -8,7 +8,7 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
-    Cell,
+    Summary,
     is_attackable,
 )
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
@@ -17,7 +17,7 @@ from adversarial_lcd_ros.registry import TARGETS
 _NONE = '-'
 
 
-def markdown_tables(cells: Sequence[Cell], methods: Sequence[Cell], ratio: float) -> str:
+def markdown_tables(cells: Sequence[Summary], methods: Sequence[Summary], ratio: float) -> str:
     """
     Return the declines at a perturbation ratio.
 
@@ -42,7 +42,8 @@ def markdown_tables(cells: Sequence[Cell], methods: Sequence[Cell], ratio: float
           for target in targets)])
 
 
-def _target(target: str, cells: Sequence[Cell], methods: Sequence[Cell], usual: Cell) -> str:
+def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], usual: Summary
+            ) -> str:
     every = sorted({cell['sequence'] for cell in cells})
     sequences = sorted({cell['sequence'] for cell in cells if is_attackable(cell)}) or every
     before = {cell['sequence']: cell['balanced_clean'] for cell in cells
@@ -72,7 +73,7 @@ def _line(texts: Iterable[str]) -> str:
     return f'| {" | ".join(texts)} |'
 
 
-def _sample(entries: Sequence[Cell | None]) -> str:
+def _sample(entries: Sequence[Summary | None]) -> str:
     """Return over how many frames a sequence has been attacked, repeats included."""
     counts = sorted({round(cell['frames'] * cell['seeds']) for cell in entries if cell})
     return ' to '.join(f'{count}' for count in dict.fromkeys([counts[0], counts[-1]]))
@@ -82,7 +83,7 @@ def _count(value: float | None) -> str:
     return _NONE if value is None else f'{value:,.0f}'
 
 
-def _decline(cell: Cell | None) -> str:
+def _decline(cell: Summary | None) -> str:
     if cell is None or not is_attackable(cell):
         return _NONE
     bounds = cell['ci95']

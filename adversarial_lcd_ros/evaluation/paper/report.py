@@ -21,7 +21,7 @@ from adversarial_lcd_ros.evaluation.paper.exports import write_exports
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
 from adversarial_lcd_ros.evaluation.paper.summaries import (
-    Cell,
+    Summary,
     summarise_cells,
     summarise_methods,
 )
@@ -74,7 +74,7 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
     return path
 
 
-def _values(rows: Sequence[Row], cells: Sequence[Cell],
+def _values(rows: Sequence[Row], cells: Sequence[Summary],
             groups: Sequence[list[DeclineTable]]) -> dict[str, Any]:
     ratio = tables.main_ratio(cells)
     methods = summarise_methods(cells)
@@ -96,7 +96,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Cell],
         'block_s': intervals.BLOCK_S, **_plots(rows, cells, groups, ratio)}
 
 
-def _plots(rows: Sequence[Row], cells: Sequence[Cell], groups: Sequence[list[DeclineTable]],
+def _plots(rows: Sequence[Row], cells: Sequence[Summary], groups: Sequence[list[DeclineTable]],
            ratio: float) -> dict[str, Any]:
     values: dict[str, Any] = dict.fromkeys(
         ('budget_plot', 'success_plot', 'success_setting', 'share_plot', 'map_plot', 'transfer'))
@@ -156,7 +156,7 @@ def _notes() -> dict[int, list[str]]:
     return notes
 
 
-def _sequences(cells: Sequence[Cell]) -> list[dict[str, str]]:
+def _sequences(cells: Sequence[Summary]) -> list[dict[str, str]]:
     rows = []
     for sequence in sorted({cell['sequence'] for cell in cells}):
         there = [cell for cell in cells if cell['sequence'] == sequence]
@@ -170,14 +170,14 @@ def _sequences(cells: Sequence[Cell]) -> list[dict[str, str]]:
     return rows
 
 
-def _range(cells: Sequence[Cell], name: str) -> str:
+def _range(cells: Sequence[Summary], name: str) -> str:
     texts = sorted({round(cell[name]) for cell in cells if cell[name] is not None})
     if not texts:
         return wording.UNDEFINED
     return f'{texts[0]}' if len(texts) == 1 else f'{texts[0]} to {texts[-1]}'
 
 
-def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, str]]]:
+def _methods(methods: Sequence[Summary], usual: Summary) -> dict[str, list[dict[str, str]]]:
     # By target, the usual ones first; the strongest attack first.
     rows: dict[str, list[dict[str, str]]] = {}
     left = list(methods)
@@ -196,7 +196,7 @@ def _methods(methods: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, s
     return rows
 
 
-def _cells(cells: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, str]]]:
+def _cells(cells: Sequence[Summary], usual: Summary) -> dict[str, list[dict[str, str]]]:
     rows: dict[str, list[dict[str, str]]] = {}
     for cell in sorted(cells, key=lambda cell: (
             cell['target'], -(cell['decline_pp'] or 0.0), full_title(cell, usual))):
@@ -206,7 +206,7 @@ def _cells(cells: Sequence[Cell], usual: Cell) -> dict[str, list[dict[str, str]]
     return {sequence: rows[sequence] for sequence in sorted(rows)}
 
 
-def _figures(summary: Cell) -> dict[str, str]:
+def _figures(summary: Summary) -> dict[str, str]:
     share = summary['share_of_optimum']
     return {'balanced accuracy': f'{wording.percent(summary["balanced_clean"])} → '
                                  f'{wording.percent(summary["balanced_attacked"])}',
@@ -215,7 +215,7 @@ def _figures(summary: Cell) -> dict[str, str]:
             'of the optimum': wording.UNDEFINED if share is None else wording.percent(share, 0)}
 
 
-def _counts(summary: Cell) -> dict[str, str]:
+def _counts(summary: Summary) -> dict[str, str]:
     return {'suppressed': f'{_count(summary["suppressed"])} of {_count(summary["found_clean"])}',
             'invented': f'{_count(summary["invented"])} of {_count(summary["silent_clean"])}',
             'unattackable': f'{_count(summary["unattackable"])} of {_count(summary["frames"])}',

@@ -42,10 +42,11 @@ _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_att
 _KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
-Cell = dict[str, Any]
+# Figures of a cell over its seeds, or of a method over sequences.
+Summary = dict[str, Any]
 
 
-def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
+def summarise_cells(rows: Iterable[Row]) -> list[Summary]:
     """
     Return one summary for all seeds of an attack on a sequence; the order of rows is no matter.
 
@@ -90,7 +91,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Cell]:
     return cells
 
 
-def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
+def summarise_methods(cells: Sequence[Summary]) -> list[Summary]:
     """
     Return one summary for each attack over its sequences, each weighing the same.
 
@@ -110,7 +111,7 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
         accuracies, of edits and queries; sums of the counts.
 
     """
-    groups: dict[tuple[Hashable, ...], list[Cell]] = defaultdict(list)
+    groups: dict[tuple[Hashable, ...], list[Summary]] = defaultdict(list)
     for cell in cells:
         if cell['decline_pp'] is not None:
             groups[tuple(cell[name] for name in ATTACK)].append(cell)
@@ -120,7 +121,7 @@ def summarise_methods(cells: Sequence[Cell]) -> list[Cell]:
             for key in sorted(groups, key=partial(_order, ATTACK))]
 
 
-def is_attackable(cell: Cell) -> bool:
+def is_attackable(cell: Summary) -> bool:
     """
     Tell whether a cell says anything of an attack.
 
@@ -130,7 +131,7 @@ def is_attackable(cell: Cell) -> bool:
     return cell['decline_pp'] is not None and cell['unattackable'] < cell['frames']
 
 
-def declines_by_sequence(cells: Iterable[Cell],
+def declines_by_sequence(cells: Iterable[Summary],
                          name: Mapping[tuple[Hashable, ...], str]) -> dict[str, dict[str, float]]:
     """
     Return method to sequence to decline of the attacks that have a name, for ``rank_methods``.
@@ -172,7 +173,7 @@ def _order(names: Sequence[str], key: tuple[Hashable, ...]) -> tuple[tuple[bool,
     return tuple((isinstance(part, str), part) for part in parts)
 
 
-def _summarise(rows: Sequence[Row]) -> Cell:
+def _summarise(rows: Sequence[Row]) -> Summary:
     rows = sorted(rows, key=lambda row: row['seed'])
     seeds = [row['seed'] for row in rows]
     cell = dict(zip(CELL, _cell_key(rows[0]), strict=True))
@@ -248,11 +249,11 @@ def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
     return None if interval is None else (100.0 * interval[0], 100.0 * interval[1])
 
 
-def _yardstick(cell: Cell) -> tuple[Hashable, ...]:
+def _yardstick(cell: Summary) -> tuple[Hashable, ...]:
     return tuple(cell[name] for name in ('sequence', 'target', 'ratio', 'nodes', 'threshold'))
 
 
-def _optima(cells: Iterable[Cell]) -> dict[tuple[Hashable, ...], float]:
+def _optima(cells: Iterable[Summary]) -> dict[tuple[Hashable, ...], float]:
     best: dict[tuple[Hashable, ...], float] = {}
     for cell in cells:
         if is_yardstick(cell) and cell['decline_pp'] is not None:
@@ -261,7 +262,8 @@ def _optima(cells: Iterable[Cell]) -> dict[tuple[Hashable, ...], float]:
     return best
 
 
-def _over_sequences(cells: Sequence[Cell], best: Mapping[tuple[Hashable, ...], float]) -> Cell:
+def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...], float]
+                    ) -> Summary:
     declines = np.array([cell['decline_pp'] for cell in cells])
     count, mean = len(declines), float(declines.mean())
     half = (float(stats.t.ppf(0.975, count - 1) * declines.std(ddof=1) / math.sqrt(count))

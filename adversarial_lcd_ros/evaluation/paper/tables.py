@@ -22,7 +22,7 @@ from adversarial_lcd_ros.evaluation.paper.ranks import Ranking, rank_methods
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
     USUAL,
-    Cell,
+    Summary,
     declines_by_sequence,
     is_attackable,
     summarise_methods,
@@ -51,7 +51,7 @@ class Line:
     """
 
     title: str
-    entries: tuple[Cell | None, ...]
+    entries: tuple[Summary | None, ...]
 
     @property
     def before(self) -> float | None:
@@ -61,7 +61,7 @@ class Line:
         return sum(values) / len(values) if values else None
 
     @property
-    def strongest(self) -> Cell | None:
+    def strongest(self) -> Summary | None:
         """The entry with the largest decline, if it is above zero; the yardstick left out."""
         there = [entry for entry in self.entries if entry and not is_yardstick(entry)
                  and (entry['decline_pp'] or 0.0) > 0.0]
@@ -91,7 +91,7 @@ class DeclineTable:
     """
 
     printed: PrintedTable
-    setting: Cell
+    setting: Summary
     values: tuple[str, ...]
     columns: tuple[str, ...]
     lines: tuple[Line, ...]
@@ -104,7 +104,7 @@ class DeclineTable:
         return setting_title(self.setting)
 
 
-def setting_title(setting: Cell) -> str:
+def setting_title(setting: Summary) -> str:
     """Return what a table holds fixed, in words."""
     parts = [f'target {setting["target"]}', wording.mode_title(setting['mode']),
              f'{setting["oracle"]} answers', f'{setting["nodes"]} features']
@@ -119,13 +119,13 @@ def setting_title(setting: Cell) -> str:
     return ', '.join(parts)
 
 
-def main_ratio(cells: Sequence[Cell]) -> float:
+def main_ratio(cells: Sequence[Summary]) -> float:
     """Return the paper's ratio if there are cells of it, else the largest."""
     ratios = {float(cell['ratio']) for cell in cells}
     return PAPER_RATIO if PAPER_RATIO in ratios or not ratios else max(ratios)
 
 
-def surrogate_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+def surrogate_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
     """Return Tables 3 and 4: surrogates with eigencentrality, a sequence a row."""
     ratio = main_ratio(cells)
     chosen = [cell for cell in _native(cells)
@@ -134,14 +134,14 @@ def surrogate_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
     return _tables(chosen, SURROGATE_TABLE, 'surrogate', surrogate_facts)
 
 
-def perturbation_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+def perturbation_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
     """Return Table 5: perturbations, with SVM-RBF where they use a surrogate."""
     ratio = main_ratio(cells)
     chosen = [cell for cell in _perturbations(cells) if cell['ratio'] == ratio]
     return _tables(chosen, PERTURBATION_TABLE, 'method', method_facts)
 
 
-def budget_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
+def budget_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
     """Return Table 6: perturbations by ratio, means over the sequences."""
     tables = []
     for setting, group in _by_setting(_perturbations(cells)):
@@ -158,13 +158,13 @@ def budget_tables(cells: Sequence[Cell]) -> list[DeclineTable]:
     return tables
 
 
-def _native(cells: Sequence[Cell]) -> list[Cell]:
+def _native(cells: Sequence[Summary]) -> list[Summary]:
     # Attacks that asked the very detector they attack.
     return [cell for cell in cells
             if cell['asked_target'] == cell['target'] and cell['mode'] != 'pass']
 
 
-def _perturbations(cells: Sequence[Cell]) -> list[Cell]:
+def _perturbations(cells: Sequence[Summary]) -> list[Summary]:
     # The paper's perturbations come with SVM-RBF; one that has no such cell comes as it is, if
     # there is only one way.
     native = _native(cells)
@@ -176,13 +176,13 @@ def _perturbations(cells: Sequence[Cell]) -> list[Cell]:
     return [cell for cell in native if cell['surrogate'] == preferred[_way(cell)]]
 
 
-def _way(cell: Cell) -> tuple[Hashable, ...]:
+def _way(cell: Summary) -> tuple[Hashable, ...]:
     return (cell['method'], *(cell[name] for name in SETTING))
 
 
-def _by_setting(cells: Sequence[Cell]) -> list[tuple[Cell, list[Cell]]]:
+def _by_setting(cells: Sequence[Summary]) -> list[tuple[Summary, list[Summary]]]:
     # The most complete setting first, then the detectors in their usual order.
-    groups: dict[tuple[Hashable, ...], list[Cell]] = {}
+    groups: dict[tuple[Hashable, ...], list[Summary]] = {}
     for cell in cells:
         groups.setdefault(tuple(cell[name] for name in SETTING), []).append(cell)
     known = {name: place for place, name in enumerate(TARGETS)}
@@ -191,7 +191,7 @@ def _by_setting(cells: Sequence[Cell]) -> list[tuple[Cell, list[Cell]]]:
     return [(dict(zip(SETTING, key, strict=True)), groups[key]) for key in order]
 
 
-def _tables(cells: Sequence[Cell], printed: PrintedTable, column: str,
+def _tables(cells: Sequence[Summary], printed: PrintedTable, column: str,
             facts: Callable[[str], type[Shown]]) -> list[DeclineTable]:
     tables = []
     for setting, group in _by_setting(cells):
@@ -212,7 +212,7 @@ def _tables(cells: Sequence[Cell], printed: PrintedTable, column: str,
     return tables
 
 
-def _ranking(cells: Sequence[Cell], column: str) -> Ranking | None:
+def _ranking(cells: Sequence[Summary], column: str) -> Ranking | None:
     names = {tuple(cell[factor] for factor in ATTACK): _heading(cell[column]) for cell in cells
              if not is_yardstick(cell)}
     declines = declines_by_sequence(cells, names)

@@ -8,34 +8,34 @@ from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_facts
-from adversarial_lcd_ros.evaluation.paper.summaries import Cell
+from adversarial_lcd_ros.evaluation.paper.summaries import Summary
 
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
           'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}',
           'threshold': 'threshold {}', 'variant': '{}'}
 
 
-def usual_settings(cells: Sequence[Cell]) -> dict[str, Any]:
+def usual_settings(cells: Sequence[Summary]) -> dict[str, Any]:
     """Return the commonest value of each setting; of equally common ones the largest."""
     counts = {name: Counter(cell[name] for cell in cells) for name in _WORDS}
     return {name: max(count, key=lambda value: (count[value], value))
             for name, count in counts.items()}
 
 
-def usual_title(usual: Cell) -> str:
+def usual_title(usual: Summary) -> str:
     """Return the usual settings in words."""
     return ', '.join(words.format(usual[name]) for name, words in _WORDS.items()
                      if usual[name] != '')
 
 
-def full_title(summary: Cell, usual: Cell) -> str:
+def full_title(summary: Summary, usual: Summary) -> str:
     """Return what an attack is called; settings that are not the usual ones are named."""
     return ', '.join([_title(summary), *(
         words.format(summary[name]) for name, words in _WORDS.items()
         if summary[name] not in (usual[name], ''))])
 
 
-def _title(summary: Cell) -> str:
+def _title(summary: Summary) -> str:
     if is_yardstick(summary):
         return method_facts(summary['search']).title
     title = wording.attack_title({**summary, 'name': None})

@@ -10,7 +10,7 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.paper.printed import BUDGET_TABLE
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
-from adversarial_lcd_ros.evaluation.paper.summaries import Cell, is_attackable
+from adversarial_lcd_ros.evaluation.paper.summaries import Summary, is_attackable
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
 from adversarial_lcd_ros.registry import TARGETS
 
@@ -20,7 +20,7 @@ _MANY_TABLES = 3
 _TIE_PP = 0.05  # what is printed as equal is equal
 
 
-def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None:
+def strongest(methods: Sequence[Summary], target: str | None = None) -> Summary | None:
     """
     Return the black-box attack with the largest mean decline; None without any.
 
@@ -45,13 +45,13 @@ def strongest(methods: Sequence[Cell], target: str | None = None) -> Cell | None
     return max(there, key=lambda method: method['decline_pp'], default=None)
 
 
-def main_target(methods: Sequence[Cell]) -> str | None:
+def main_target(methods: Sequence[Summary]) -> str | None:
     """Return the first target, in the usual order, that was attacked."""
     there = {method['target'] for method in methods}
     return next((name for name in (*TARGETS, *sorted(there)) if name in there), None)
 
 
-def headline(methods: Sequence[Cell], ratio: float) -> str:
+def headline(methods: Sequence[Summary], ratio: float) -> str:
     """Return the main finding at a perturbation ratio in one or two sentences."""
     here = [method for method in methods if method['ratio'] == ratio]
     target = main_target(here)
@@ -154,7 +154,7 @@ def _certainty(ranking: Ranking | None, names: Sequence[str]) -> str:
     return f'Beyond chance with {count} sequences: {what}.'
 
 
-def warnings(cells: Sequence[Cell], tables: Sequence[DeclineTable]) -> list[str]:
+def warnings(cells: Sequence[Summary], tables: Sequence[DeclineTable]) -> list[str]:
     """Return what a reader has to know before the figures, each a sentence or two."""
     texts = []
     seeds = [cell['seeds'] for cell in cells]
@@ -205,7 +205,7 @@ def _listed(tables: Sequence[str]) -> str:
     return ', '.join(tables) if len(tables) < _MANY_TABLES else f'{len(tables)} tables'
 
 
-def _trained(cells: Sequence[Cell]) -> list[str]:
+def _trained(cells: Sequence[Summary]) -> list[str]:
     seen = {cell['sequence']: sorted({other['target'] for other in cells if other['trained_on']
                                       and other['sequence'] == cell['sequence']})
             for cell in cells}
@@ -213,7 +213,7 @@ def _trained(cells: Sequence[Cell]) -> list[str]:
             'are worth.' for sequence, targets in sorted(seen.items()) if targets]
 
 
-def _frames(cells: Sequence[Cell]) -> list[str]:
+def _frames(cells: Sequence[Summary]) -> list[str]:
     texts = []
     for sequence in sorted({cell['sequence'] for cell in cells}):
         of_sequence = [cell for cell in cells if cell['sequence'] == sequence]

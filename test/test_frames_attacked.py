@@ -135,7 +135,7 @@ def test_transfer_asks_one_target_and_is_judged_by_another():
 
 @pytest.mark.parametrize('overspent', [
     {'edit_budget': 0}, {'query_budget': 1}, {'queries': 1}])
-def test_an_attack_over_budget_fails_the_sweep(lcd, monkeypatch, overspent):
+def test_an_attack_over_budget_fails_the_experiment(lcd, monkeypatch, overspent):
     attack = Attacker.attack
     monkeypatch.setattr(frames.Attacker, 'attack', lambda self, *given: replace(
         attack(self, *given), **overspent))

@@ -1,4 +1,4 @@
-"""Sweeps: resumed without repeating a cell, side by side, and on a cluster that loses a worker."""
+"""Experiments: resumed, side by side, and on a cluster that loses a worker."""
 
 from functools import partial
 import json
@@ -11,15 +11,15 @@ import threading
 import time
 
 import pytest
-from sweep_factory import LABELS, NODES, RECIPE, builder_config, lcd_config, walk_folder
+from walk_factory import LABELS, NODES, RECIPE, builder_config, lcd_config, walk_folder
 
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.frames import run as sweep_module
+from adversarial_lcd_ros.evaluation.frames import run as run_module
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.frames.run import (
     kinds_of_cells,
-    plan_sweep,
-    run_sweep,
+    plan_experiment,
+    run_experiment,
     run_task,
 )
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
@@ -56,15 +56,16 @@ def untimed(rows):
     return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
 
 
-def swept(folder, streams, cells, lcd, run=map, progress=nothing):
+def run_cells(folder, streams, cells, lcd, run=map, progress=nothing):
     with open_store(folder) as store:
-        return run_sweep(plan_sweep(streams, cells, lcd, list(store.rows)), store, run, progress)
+        experiment = plan_experiment(streams, cells, lcd, list(store.rows))
+        return run_experiment(experiment, store, run, progress)
 
 
-def test_a_sweep_gives_a_row_for_every_cell_and_seed(tmp_path, streams, cells, lcd):
+def test_an_experiment_gives_a_row_for_every_cell_and_seed(tmp_path, streams, cells, lcd):
     shares = []
-    rows = swept(tmp_path / 'out', streams, cells, lcd,
-                 progress=lambda *now: shares.append(now))
+    rows = run_cells(tmp_path / 'out', streams, cells, lcd,
+                     progress=lambda *now: shares.append(now))
     assert len(rows) == 2 * len(cells) == 10
     assert shares[-1] == (10, pytest.approx(1.0))
     assert {row['frames'] for row in rows} == {4}
@@ -75,9 +76,9 @@ def test_a_sweep_gives_a_row_for_every_cell_and_seed(tmp_path, streams, cells, l
     assert rows[0]['balanced_clean'] is not None
 
 
-def test_a_broken_sweep_goes_on_where_it_was(tmp_path, streams, cells, lcd, monkeypatch):
-    whole = swept(tmp_path / 'whole', streams, cells, lcd)
-    monkeypatch.setattr(sweep_module, '_TASK_S', 0.0)
+def test_a_broken_experiment_goes_on_where_it_was(tmp_path, streams, cells, lcd, monkeypatch):
+    whole = run_cells(tmp_path / 'whole', streams, cells, lcd)
+    monkeypatch.setattr(run_module, '_TASK_S', 0.0)
 
     def broken(function, tasks):
         for task in tasks[:4]:
@@ -85,17 +86,17 @@ def test_a_broken_sweep_goes_on_where_it_was(tmp_path, streams, cells, lcd, monk
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        swept(tmp_path / 'out', streams, cells, lcd, broken)
+        run_cells(tmp_path / 'out', streams, cells, lcd, broken)
     kept = (tmp_path / 'out' / 'cells.jsonl').read_bytes()
     assert kept.count(b'\n') == 4
 
     ran = []
-    rows = swept(tmp_path / 'out', streams, cells, lcd, lambda function, tasks: (
+    rows = run_cells(tmp_path / 'out', streams, cells, lcd, lambda function, tasks: (
         ran.append(len(task.cells)) or function(task) for task in tasks))
     assert sum(ran) == 6
     assert (tmp_path / 'out' / 'cells.jsonl').read_bytes().startswith(kept)
     assert untimed(rows) == untimed(whole)
-    assert swept(tmp_path / 'out', streams, cells, lcd, lambda function, tasks: iter(
+    assert run_cells(tmp_path / 'out', streams, cells, lcd, lambda function, tasks: iter(
         [1 / len(tasks)] if tasks else [])) == rows
 
 
@@ -106,9 +107,9 @@ def test_graphs_that_have_changed_are_refused(tmp_path, streams, cells, lcd):
 
 
 def test_processes_side_by_side_give_the_same(tmp_path, streams, cells, lcd):
-    expected = swept(tmp_path / 'one', streams, cells, lcd)
+    expected = run_cells(tmp_path / 'one', streams, cells, lcd)
     with local_workers(2) as run:
-        rows = swept(tmp_path / 'two', streams, cells, lcd, run)
+        rows = run_cells(tmp_path / 'two', streams, cells, lcd, run)
     assert untimed(rows) == untimed(expected)
 
 
@@ -179,8 +180,8 @@ def cluster(tmp_path):
 
 def test_a_cluster_that_loses_a_worker_loses_no_cell(tmp_path, streams, cells, lcd, cluster,
                                                     monkeypatch):
-    monkeypatch.setattr(sweep_module, '_TASK_S', 0.0)
-    expected = swept(tmp_path / 'one', streams, cells, lcd)
+    monkeypatch.setattr(run_module, '_TASK_S', 0.0)
+    expected = run_cells(tmp_path / 'one', streams, cells, lcd)
     marker, finished = tmp_path / 'marker', []
 
     def kill_then_go_on(cell_count, share):
@@ -190,9 +191,9 @@ def test_a_cluster_that_loses_a_worker_loses_no_cell(tmp_path, streams, cells, l
             os.kill(int(marker.read_text()), signal.SIGKILL)
 
     with dask_workers(cluster) as run:
-        rows = swept(tmp_path / 'two', streams, cells, lcd,
-                     lambda function, tasks: run(partial(run_once_killed, str(marker)), tasks),
-                     kill_then_go_on)
+        rows = run_cells(tmp_path / 'two', streams, cells, lcd,
+                         lambda function, tasks: run(partial(run_once_killed, str(marker)), tasks),
+                         kill_then_go_on)
     assert untimed(rows) == untimed(expected)
     assert finished == list(range(1, 11))
 
