@@ -8,15 +8,13 @@ number it was not made for. Every refusal names its cause.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from adversarial_lcd_ros.compiled import ranges
 from adversarial_lcd_ros.config import MessageLimits
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
-
-if TYPE_CHECKING:
-    from adversarial_lcd_ros.codec import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages import AttackReport, LoopClosure
 
 STATUSES = ('success', 'failure', 'skipped')
 MAX_NAME = 256

@@ -7,8 +7,6 @@ that no interface package has to be built. A later interface package would carry
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-import math
 from typing import Any
 
 import numpy as np
@@ -26,6 +24,14 @@ from adversarial_lcd_ros.checks import (
 from adversarial_lcd_ros.config import MessageLimits
 from adversarial_lcd_ros.errors import CodecError, GraphError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, MultiTierGraph
+from adversarial_lcd_ros.messages import (
+    AttackReport,
+    FrameDetections,
+    LcdAnswer,
+    LcdQuery,
+    LoopClosure,
+    log_odds,
+)
 from adversarial_lcd_ros.paths import PACKAGE
 from adversarial_lcd_ros.schemas import MESSAGES as MESSAGES
 from adversarial_lcd_ros.schemas import dump as _dump
@@ -41,143 +47,6 @@ MAX_PAYLOAD_BYTES = LIMITS.max_payload_bytes
 _NS = 1_000_000_000
 _REPORT_FIELDS = ('sequence', 'status', 'reason', 'edit_budget', 'edits', 'query_budget',
                   'queries', 'loss_before', 'loss_after', 'duration_s')
-
-
-@dataclass(frozen=True)
-class LoopClosure:
-    """
-    What the detector decided on one graph.
-
-    Attributes
-    ----------
-    stamp_ns, frame_id, sequence
-        Of the graph decided on.
-    is_loop : bool
-        Probability at or above the detector's threshold.
-    probability : float
-        Calibrated probability of a loop closure, 0 to 1.
-    match_stamp_ns, match_sequence : int or None
-        Best matching keyframe; None without a candidate outside the temporal gap.
-    vbow_score : float
-        DBoW L1 score with the match, 0 to 1.
-    candidates : int
-        Number of keyframes compared with the graph.
-    log_odds : float, optional
-        Of the probability, which rounds to 0 or 1 far out; made from it if not given.
-    session, match_session : int
-        Which run of the detector decided, and which run of the builder made the matching
-        keyframe: numbers start again with each. 0: not known. Not compared.
-
-    """
-
-    stamp_ns: int
-    frame_id: str
-    sequence: int
-    is_loop: bool
-    probability: float
-    match_stamp_ns: int | None = None
-    match_sequence: int | None = None
-    vbow_score: float = 0.0
-    candidates: int = 0
-    log_odds: float = field(default=math.nan)
-    session: int = field(default=0, compare=False)
-    match_session: int = field(default=0, compare=False)
-
-    def __post_init__(self) -> None:
-        """Make the log odds from the probability where they were not given."""
-        _complete(self)
-
-
-@dataclass(frozen=True)
-class LcdQuery:
-    """A graph that the detector shall judge without remembering it."""
-
-    id: int
-    graph: MultiTierGraph
-
-
-@dataclass(frozen=True)
-class LcdAnswer:
-    """The detector's answer to the query of the same id."""
-
-    id: int
-    is_loop: bool
-    is_soft: bool
-    probability: float
-    log_odds: float = field(default=math.nan)
-    session: int = field(default=0, compare=False)
-
-    def __post_init__(self) -> None:
-        """Make the log odds from the probability where they were not given."""
-        _complete(self)
-
-
-def _complete(judged: LoopClosure | LcdAnswer) -> None:
-    if math.isnan(judged.log_odds):
-        object.__setattr__(judged, 'log_odds', _logit(judged.probability))
-
-
-@dataclass(frozen=True)
-class AttackReport:
-    """
-    What the attacker did to one graph; the fields are those of AttackReport.msg.
-
-    Attributes
-    ----------
-    status : str
-        success, failure or skipped.
-    edit_budget, edits, query_budget, queries : int
-        Granted and spent.
-    loss_before, loss_after : float
-        Attack loss of the clean and of the forwarded graph; above 0 is success.
-    duration_s : float
-        From the graph's arrival to its publication, seconds.
-
-    """
-
-    stamp_ns: int
-    frame_id: str
-    sequence: int
-    status: str
-    reason: str = ''
-    edit_budget: int = 0
-    edits: int = 0
-    query_budget: int = 0
-    queries: int = 0
-    loss_before: float = 0.0
-    loss_after: float = 0.0
-    duration_s: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class FrameDetections:
-    """
-    What a detector of the user's own has found in one frame.
-
-    Attributes
-    ----------
-    stamp_ns, frame_id
-        Of the frame.
-    label : uint32, (k,)
-        Class.
-    box : float32, (k, 4)
-        x, y of the upper left corner, width, height, pixels; may reach beyond the image.
-    score : float32, (k,)
-        Confidence, 0 to 1.
-
-    """
-
-    stamp_ns: int
-    frame_id: str
-    label: NDArray[np.uint32]
-    box: NDArray[np.float32]
-    score: NDArray[np.float32]
-
-
-def _logit(probability: float) -> float:
-    if not 0.0 < probability < 1.0:
-        return math.copysign(math.inf, probability - 0.5)
-    return math.log(probability) - math.log1p(-probability)
 
 
 def _header(stamp_ns: int, frame_id: str) -> Any:
@@ -307,9 +176,9 @@ def decode_loop_closure(payload: bytes | bytearray | memoryview) -> LoopClosure:
 
 def _log_odds(message: Any) -> float:
     """Return the log odds of a message, those of its probability if it is of version 1."""
-    log_odds = float(getattr(message, 'log_odds', _logit(message.probability)))
-    check_probability(message.probability, log_odds)
-    return log_odds
+    known = float(getattr(message, 'log_odds', log_odds(message.probability)))
+    check_probability(message.probability, known)
+    return known
 
 
 def encode_query(query: LcdQuery) -> bytes:

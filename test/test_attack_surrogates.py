@@ -12,10 +12,10 @@ from sklearn.svm import SVC
 from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import SURROGATES, Kernel, make_surrogate
-from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.decision import probability
+from adversarial_lcd_ros.messages import LcdAnswer
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     concatenated_features,
     flip_features,

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.attack.attacker import AttackResult
-from adversarial_lcd_ros.codec import LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames import cells as cells_module
@@ -18,6 +17,7 @@ from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.rows import make_row
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 from adversarial_lcd_ros.evaluation.store import CELLS, open_store, read_cells
+from adversarial_lcd_ros.messages import LoopClosure
 
 CELL = Cell('stepwise', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from test_labels import path
 
-from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.evaluation.replay.label_variants import (
     label_variants,
@@ -16,6 +15,7 @@ from adversarial_lcd_ros.evaluation.replay.label_variants import (
 )
 from adversarial_lcd_ros.evaluation.replay.records import AttackRun, make_records
 from adversarial_lcd_ros.ground_truth.labels import label_frames
+from adversarial_lcd_ros.messages import AttackReport, LoopClosure
 
 SIZE = (640, 480)
 BASE = LabelConfig(min_gap_s=5.0)

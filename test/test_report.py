@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from adversarial_lcd_ros.codec import AttackReport, LoopClosure
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
@@ -25,6 +24,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
+from adversarial_lcd_ros.messages import AttackReport, LoopClosure
 
 COUNT = 60
 ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',

@@ -20,10 +20,10 @@ from adversarial_lcd_ros.attack.oracle import (
 )
 from adversarial_lcd_ros.attack.search import Hunt
 from adversarial_lcd_ros.attack.searches import make_search
-from adversarial_lcd_ros.codec import AttackReport
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import AttackReport
 
 
 @dataclass(frozen=True)

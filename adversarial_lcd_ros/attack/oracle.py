@@ -9,16 +9,15 @@ import time
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import LcdAnswer
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import MAX_LOGIT, LcdAnswer, log_odds
 
 # What a detector of one's own may answer: the probability of a loop, or whether it is one.
 Answer = LcdAnswer | float | bool
 Ask = Callable[[MultiTierGraph], Answer]
 HARD_LOGIT = 1.0
-MAX_LOGIT = 700.0
 DEADLINE = 'deadline'
 
 
@@ -46,10 +45,7 @@ def answer_logit(answer: LcdAnswer) -> float:
     """Return the log odds in a soft answer; +-1 for a hard one, which tells the side only."""
     if not answer.is_soft:
         return HARD_LOGIT if answer.is_loop else -HARD_LOGIT
-    chance = answer.probability
-    if chance <= 0 or chance >= 1:
-        return math.copysign(MAX_LOGIT, chance - 0.5)
-    return math.log(chance) - math.log1p(-chance)
+    return min(max(log_odds(answer.probability), -MAX_LOGIT), MAX_LOGIT)
 
 
 def as_answer(answer: Answer) -> LcdAnswer:

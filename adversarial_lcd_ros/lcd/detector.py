@@ -9,13 +9,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.scoring import Compared, Judge
 from adversarial_lcd_ros.lcd.views import View
+from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery, LoopClosure
 
 CACHED_VIEWS = 256
 

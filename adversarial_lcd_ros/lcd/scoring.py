@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-import math
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +22,7 @@ from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.defences import Defence, make_defences
 from adversarial_lcd_ros.lcd.targets import Scores, Target, decision_path, make_target
 from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
-
-# Beyond, a probability is 0 or 1 in double precision.
-MAX_LOGIT = 700.0
+from adversarial_lcd_ros.messages import MAX_LOGIT, log_odds
 
 
 @dataclass(frozen=True)
@@ -203,9 +200,6 @@ class Judge:
         for candidate in np.unique(best[declared]).tolist():
             share = support(candidate)
             if share < 1:
-                settled[declared & (best == candidate)] = _log_odds(self.threshold * share)
+                settled[declared & (best == candidate)] = max(
+                    log_odds(self.threshold * share), -MAX_LOGIT)
         return settled
-
-
-def _log_odds(chance: float) -> float:
-    return math.log(chance) - math.log1p(-chance) if chance > 0 else -MAX_LOGIT

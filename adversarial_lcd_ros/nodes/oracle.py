@@ -12,9 +12,9 @@ from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.oracle import OracleSilentError
-from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery
 from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
 from adversarial_lcd_ros.nodes.endpoints import (
     create_payload_publisher,

@@ -13,7 +13,6 @@ from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.oracle import answer_logit
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
-from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -24,6 +23,7 @@ from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.scoring import Scoring, prepared
+from adversarial_lcd_ros.messages import LcdQuery
 from adversarial_lcd_ros.training.networks import make_trainer
 from adversarial_lcd_ros.training.pair_scores import (
     LabelledPairs,

@@ -40,9 +40,9 @@ from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 # Of the row's columns; a change in the code below makes rows again by itself.
 KIND, SCHEMA = 'targets', 3
-_CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'ground_truth/pairs',
-         'training/pair_scores', 'evaluation/metrics', 'evaluation/intervals',
-         'evaluation/replay/offline', 'evaluation/detectors/run')
+_CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
+         'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
+         'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')
 
 _FIGURES = ('positives', 'negatives', 'balanced_accuracy', 'average_precision',

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import Ask
-from adversarial_lcd_ros.codec import LcdAnswer, LcdQuery, LoopClosure
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
@@ -28,6 +27,7 @@ from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, FrameLabels
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery, LoopClosure
 
 _DRAW = 20_210  # of the one drawing that all seeds share
 

@@ -23,7 +23,7 @@ from adversarial_lcd_ros.registry import YARDSTICKS
 # Of the row's columns; a change in the code below runs cells again by itself.
 SCHEMA = 4
 # What makes the figures of a row.
-_CODE = ('attack', 'lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled',
+_CODE = ('attack', 'lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
          'evaluation/metrics', 'evaluation/frames/attacked', 'evaluation/frames/optimum',
          'evaluation/frames/rows')
 ORACLES = ('soft', 'hard')

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.attacker import AttackResult
-from adversarial_lcd_ros.attack.oracle import MAX_LOGIT, edit_budget
+from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer
+from adversarial_lcd_ros.messages import MAX_LOGIT
 from adversarial_lcd_ros.shown import Shown
 
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import time
 
 from adversarial_lcd_ros.attack.attacker import Attacker
-from adversarial_lcd_ros.codec import LcdQuery
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation.replay.records import AttackRun
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.messages import LcdQuery
 
 
 def run_offline(graphs: Sequence[MultiTierGraph], lcd: LcdConfig,

@@ -9,13 +9,7 @@ from pathlib import Path
 
 import yaml
 
-from adversarial_lcd_ros.codec import (
-    AttackReport,
-    LoopClosure,
-    decode_attack_report,
-    decode_graph,
-    decode_loop_closure,
-)
+from adversarial_lcd_ros.codec import decode_attack_report, decode_graph, decode_loop_closure
 from adversarial_lcd_ros.compiled.caching import code_folder
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.evaluation.replay.domain import VARIABLE
@@ -26,6 +20,7 @@ from adversarial_lcd_ros.evaluation.replay.supervision import (
     ended_together,
 )
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import AttackReport, LoopClosure
 from adversarial_lcd_ros.paths import share_path
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
