@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.messages import LcdAnswer
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.types import LcdAnswer
 from adversarial_lcd_ros.registry import PERTURBATIONS, TARGETS
 
 _OBJECTS = 2

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.attack.oracle import Oracle, edit_budget
 from adversarial_lcd_ros.attack.search import Hunt
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.messages import LcdQuery
+from adversarial_lcd_ros.messages.types import LcdQuery
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import concatenated_features, node_features
 
 ITERATIONS = 2

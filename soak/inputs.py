@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import codec
 
 _EXTREMES = [bytes(4), b'\xff' * 4, b'\xff\xff\xff\x7f', b'\0\0\0\x80', b'\0\0\xc0\x7f',
              b'\0\0\x80\x7f', b'\x01\0\0\0', b'\0\0\x80\xff', b'\xff\xff\x7f\x7f']

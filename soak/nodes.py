@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import decode_graph, decode_loop_closure, encode_graph
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages.codec import decode_graph, decode_loop_closure, encode_graph
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.paths import share_path
-from adversarial_lcd_ros.payload import unwrap, wrap
 from soak.inputs import damaged, graph
 from soak.outcome import Outcome, Slope, resident_mb
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, CodecError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
@@ -19,6 +18,7 @@ from adversarial_lcd_ros.evaluation.store import read_cells
 from adversarial_lcd_ros.files.reading import read_json
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.targets import TARGETS
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.paths import model_path, share_path
 from adversarial_lcd_ros.sequences import import_sequence
 from adversarial_lcd_ros.settings import load_settings

@@ -7,7 +7,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from adversarial_lcd_ros.codec import typestore
+from adversarial_lcd_ros.messages.codec import typestore
 
 WIDTH, HEIGHT = 64, 48
 START_NS, PERIOD_NS = 1_305_031_229_528_748_000, 33_333_333

@@ -26,7 +26,7 @@ from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError, ConfigError, ModelError
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.messages import LcdAnswer
+from adversarial_lcd_ros.messages.types import LcdAnswer
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     flip_features,
     iterate,

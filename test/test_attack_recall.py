@@ -13,7 +13,7 @@ from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.messages import LcdAnswer
+from adversarial_lcd_ros.messages.types import LcdAnswer
 
 RING = [(k, k + 1) for k in range(2, 59)]
 SPOKES = [(0, k) for k in range(10, 22)] + [(1, k) for k in range(30, 42)]

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.attack.surrogates import SURROGATES, Kernel, make_surro
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.lcd.decision import probability
-from adversarial_lcd_ros.messages import LcdAnswer
+from adversarial_lcd_ros.messages.types import LcdAnswer
 from adversarial_lcd_ros.weisfeiler_lehman.continuous import (
     concatenated_features,
     flip_features,

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.paths import object_model_path
 from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
 from adversarial_lcd_ros.vision.features import Features

@@ -11,11 +11,11 @@ import pytest
 
 from adversarial_lcd_ros import paths, preloading
 from adversarial_lcd_ros.cli import main
-from adversarial_lcd_ros.codec import decode_graph, encode_graph
 from adversarial_lcd_ros.compiled import caching
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.messages.codec import decode_graph, encode_graph
 from adversarial_lcd_ros.registry import PERTURBATIONS, TARGETS
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.builder import GraphBuilder

@@ -6,9 +6,10 @@ from graph_factory import make_graph
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import __version__, codec
+from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.settings import render_parameters
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg
 
-from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.checks import STATUSES
 from adversarial_lcd_ros.config import BuilderConfig, MessageLimits
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.keyframes.database import Database
-from adversarial_lcd_ros.schemas import schema_version, typestore
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.checks import STATUSES
+from adversarial_lcd_ros.messages.schemas import schema_version, typestore
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 

@@ -9,11 +9,11 @@ from hypothesis.extra import numpy as hnp
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig, LcdConfig
 from adversarial_lcd_ros.errors import CodecError, ConfigError, SequenceError
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.inspection import identify_payload

@@ -20,7 +20,7 @@ from adversarial_lcd_ros.evaluation.frames.attacked import (
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.messages import LcdQuery
+from adversarial_lcd_ros.messages.types import LcdQuery
 
 RING = [(k, k + 1) for k in range(2, 29)] + [(k % 2, k) for k in range(4, 30)]
 ATTACK = AttackConfig(surrogate='none', ratio=0.01, queries_per_edit=3)

@@ -17,7 +17,7 @@ from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.rows import make_row
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 from adversarial_lcd_ros.evaluation.store import CELLS, open_store, read_cells
-from adversarial_lcd_ros.messages import LoopClosure
+from adversarial_lcd_ros.messages.types import LoopClosure
 
 CELL = Cell('stepwise', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from walk_factory import walk_folder
 
-from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.graph_sequences import cache
 from adversarial_lcd_ros.graph_sequences import opening as graph_sequences
 from adversarial_lcd_ros.graph_sequences.cache import load_graphs, save_graphs
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
+from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.evaluation.replay.label_variants import (
 )
 from adversarial_lcd_ros.evaluation.replay.records import AttackRun, make_records
 from adversarial_lcd_ros.ground_truth.labels import label_frames
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 SIZE = (640, 480)
 BASE = LabelConfig(min_gap_s=5.0)

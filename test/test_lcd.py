@@ -19,7 +19,7 @@ from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
 from adversarial_lcd_ros.lcd.views import Comparison, View
-from adversarial_lcd_ros.messages import LcdQuery
+from adversarial_lcd_ros.messages.types import LcdQuery
 from adversarial_lcd_ros.paths import model_path
 
 GRAPH = make_graph(40, [(0, 1), *((0, k) for k in range(2, 12)), *((1, k) for k in range(12, 20)),

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
-from adversarial_lcd_ros.messages import AttackReport
+from adversarial_lcd_ros.messages.types import AttackReport
 from adversarial_lcd_ros.paths import share_path
 
 SUMMARY_FIELDS = {

@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 from test_nodes_lcd import DAMAGED, EDGES, SECOND, graph
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.messages import codec
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.attacker import AttackerNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.payload import unwrap, wrap
 
 
 class Line:

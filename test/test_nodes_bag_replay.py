@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
@@ -16,11 +16,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import UInt8MultiArray
 
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.attacker import AttackerNode
 from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.graph_builder import GraphBuilderNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.payload import unwrap, wrap
 
 PERIOD_NS, FRAMES = 200_000_000, 15
 STAMPS = [5_000_000_000 + k * PERIOD_NS for k in range(FRAMES)]

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
-from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.draw import draw_graph
 
@@ -18,9 +18,9 @@ pytest.importorskip('rclpy', reason='rclpy is not installed')
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import CompressedImage, Image
 
+from adversarial_lcd_ros.messages.payload import unwrap
 from adversarial_lcd_ros.nodes.graph_builder import GraphBuilderNode
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.payload import unwrap
 
 
 def picture(seed=0, height=120, width=160):

@@ -12,9 +12,9 @@ import pytest
 from test_codec import damaged
 from test_nodes_lcd import SECOND, graph
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.payload import unwrap, wrap
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 

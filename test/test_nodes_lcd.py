@@ -7,12 +7,12 @@ from graph_factory import make_graph
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
+from adversarial_lcd_ros.messages import codec
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.payload import unwrap, wrap
 
 SECOND = 1_000_000_000
 EDGES = [(0, 1), *((0, k) for k in range(2, 12)), *((k, k + 1) for k in range(2, 39))]

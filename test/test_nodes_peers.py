@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.payload import wrap
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import wrap
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')

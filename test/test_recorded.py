@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.cli import main
-from adversarial_lcd_ros.codec import encode_attack_report, encode_graph, encode_loop_closure
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.recorded import is_recording, read_recording
-from adversarial_lcd_ros.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages.codec import (
+    encode_attack_report,
+    encode_graph,
+    encode_loop_closure,
+)
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.replay import PAYLOAD
 
 COUNT = 24

@@ -14,9 +14,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import yaml
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay, read_payloads

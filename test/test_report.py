@@ -24,7 +24,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 COUNT = 60
 ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',

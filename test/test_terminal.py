@@ -7,11 +7,11 @@ from graph_factory import make_graph
 import numpy as np
 import pytest
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.commands.common import make_console, progress_bar
 from adversarial_lcd_ros.evaluation.replay.tables import _table
-from adversarial_lcd_ros.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 
 # Markup of rich that is opened, closed without being open, or a style that there is not.

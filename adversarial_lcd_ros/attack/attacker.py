@@ -23,7 +23,7 @@ from adversarial_lcd_ros.attack.searches import make_search
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages import AttackReport
+from adversarial_lcd_ros.messages.types import AttackReport
 
 
 @dataclass(frozen=True)

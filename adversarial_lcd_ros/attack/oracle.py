@@ -12,7 +12,7 @@ import numpy as np
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages import MAX_LOGIT, LcdAnswer, log_odds
+from adversarial_lcd_ros.messages.types import MAX_LOGIT, LcdAnswer, log_odds
 
 # What a detector of one's own may answer: the probability of a loop, or whether it is one.
 Answer = LcdAnswer | float | bool

@@ -8,13 +8,13 @@ from functools import lru_cache, partial
 import hashlib
 from pathlib import Path
 
-from adversarial_lcd_ros.codec import encode_graph
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels
+from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
 

@@ -14,7 +14,6 @@ import numpy as np
 import onnxruntime
 import scipy
 
-from adversarial_lcd_ros.codec import decode_graph, encode_graph, schema_text
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.errors import CodecError, EvaluationError, FileError, ModelError
@@ -23,12 +22,13 @@ from adversarial_lcd_ros.files.network import MAX_NETWORK_BYTES
 from adversarial_lcd_ros.files.reading import read_bytes
 from adversarial_lcd_ros.files.writing import replacing
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages.codec import decode_graph, encode_graph, schema_text
 from adversarial_lcd_ros.paths import VOCABULARY, model_path, object_model_path
 from adversarial_lcd_ros.sequences import Sequence
 
 # What decides on the bytes of a graph: libraries, and code of this package.
 _LIBRARIES = (np, scipy, cv2, onnxruntime, numba)
-_CODE = ('vision', 'graph', 'compiled', 'codec', 'sequences/frame', 'sequences/detections')
+_CODE = ('vision', 'graph', 'compiled', 'messages', 'sequences/frame', 'sequences/detections')
 _MAX_CACHE_BYTES = 1 << 33
 # Threads change how long a graph takes, not what it is.
 _IRRELEVANT = ('threads',)

@@ -15,11 +15,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import decode_graph
 from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.cache import cache_key, load_graphs, save_graphs
+from adversarial_lcd_ros.messages.codec import decode_graph
 from adversarial_lcd_ros.paths import cache_folder
 from adversarial_lcd_ros.sequences import Sequence, Trajectory, open_sequence
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, PAYLOAD, BagFile, is_bag

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.scoring import Compared, Judge
 from adversarial_lcd_ros.lcd.views import View
-from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery, LoopClosure
+from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery, LoopClosure
 
 CACHED_VIEWS = 256
 

@@ -22,7 +22,7 @@ from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.defences import Defence, make_defences
 from adversarial_lcd_ros.lcd.targets import Scores, Target, decision_path, make_target
 from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
-from adversarial_lcd_ros.messages import MAX_LOGIT, log_odds
+from adversarial_lcd_ros.messages.types import MAX_LOGIT, log_odds
 
 
 @dataclass(frozen=True)

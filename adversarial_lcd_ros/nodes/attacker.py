@@ -19,17 +19,17 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt8MultiArray
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import DEADLINE
 from adversarial_lcd_ros.errors import CodecError, ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, create_payload_publisher
 from adversarial_lcd_ros.nodes.oracle import TopicOracle
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.sideline import Sideline
 from adversarial_lcd_ros.nodes.streams import GraphWatch
-from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.preloading import load_for_attacker
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 

@@ -19,14 +19,14 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import UInt8MultiArray
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
 from adversarial_lcd_ros.nodes.peers import Strangers, getting_ready
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import SessionWatch
-from adversarial_lcd_ros.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.start import report

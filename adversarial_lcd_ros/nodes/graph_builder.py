@@ -21,9 +21,10 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header, UInt8MultiArray
 
-from adversarial_lcd_ros.checks import checked_name, checked_stamp_ns
-from adversarial_lcd_ros.codec import decode_detections, encode_graph
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.messages.checks import checked_name, checked_stamp_ns
+from adversarial_lcd_ros.messages.codec import decode_detections, encode_graph
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -32,7 +33,6 @@ from adversarial_lcd_ros.nodes.endpoints import (
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import StampWatch
-from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.preloading import load_for_builder
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder

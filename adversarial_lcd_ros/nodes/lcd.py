@@ -14,9 +14,10 @@ from typing import Any
 
 from std_msgs.msg import UInt8MultiArray
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -25,7 +26,6 @@ from adversarial_lcd_ros.nodes.endpoints import (
 )
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import GraphWatch
-from adversarial_lcd_ros.payload import unwrap, wrap
 from adversarial_lcd_ros.preloading import load_for_detector
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 

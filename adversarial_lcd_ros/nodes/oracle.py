@@ -10,11 +10,12 @@ import time
 from rclpy.node import Node
 from std_msgs.msg import UInt8MultiArray
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.attack.oracle import OracleSilentError
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import unwrap, wrap
+from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery
 from adversarial_lcd_ros.nodes.diagnostics import Diagnostics
 from adversarial_lcd_ros.nodes.endpoints import (
     create_payload_publisher,
@@ -22,7 +23,6 @@ from adversarial_lcd_ros.nodes.endpoints import (
     payload_qos,
 )
 from adversarial_lcd_ros.nodes.streams import SessionWatch
-from adversarial_lcd_ros.payload import unwrap, wrap
 
 _LOOK_S = 0.01
 _UNANSWERED = 3

@@ -8,8 +8,8 @@ import struct
 from rclpy.node import Node
 
 from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.messages.payload import unwrap
 from adversarial_lcd_ros.nodes.diagnostics import TOPIC as DIAGNOSTICS
-from adversarial_lcd_ros.payload import unwrap
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns
 
 # What every node has from its first moment on.

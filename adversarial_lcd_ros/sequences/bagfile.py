@@ -17,9 +17,9 @@ from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
-from adversarial_lcd_ros.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages.codec import typestore
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, join_ns
 from adversarial_lcd_ros.sequences.damage import METADATA, diagnose, missing_messages
 from adversarial_lcd_ros.sequences.image_files import is_hidden

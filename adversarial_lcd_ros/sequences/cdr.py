@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.messages.codec import typestore
 
 _NS = 1_000_000_000
 _CDR_HEADER = 4  # bytes of encapsulation, then the stamp of a std_msgs/Header

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import typestore
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.messages.codec import typestore
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from adversarial_lcd_ros import codec
 from adversarial_lcd_ros.errors import CodecError, FileError
 from adversarial_lcd_ros.files.reading import read_bytes
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.opening import open_sequence
 

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.codec import MESSAGES, schema_text, typestore
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, SequenceError
+from adversarial_lcd_ros.messages.codec import MESSAGES, schema_text, typestore
+from adversarial_lcd_ros.messages.payload import unwrap
 from adversarial_lcd_ros.paths import PACKAGE
-from adversarial_lcd_ros.payload import unwrap
 from adversarial_lcd_ros.sequences.bagfile import PAYLOAD, POSE, BagFile, BagWriter
 from adversarial_lcd_ros.sequences.bags import camera_topics, described_topics
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp

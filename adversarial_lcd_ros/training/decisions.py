@@ -23,7 +23,7 @@ from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.scoring import Scoring, prepared
-from adversarial_lcd_ros.messages import LcdQuery
+from adversarial_lcd_ros.messages.types import LcdQuery
 from adversarial_lcd_ros.training.networks import make_trainer
 from adversarial_lcd_ros.training.pair_scores import (
     LabelledPairs,

@@ -27,7 +27,7 @@ from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, FrameLabels
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
-from adversarial_lcd_ros.messages import LcdAnswer, LcdQuery, LoopClosure
+from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery, LoopClosure
 
 _DRAW = 20_210  # of the one drawing that all seeds share
 

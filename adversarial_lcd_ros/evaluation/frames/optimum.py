@@ -21,7 +21,7 @@ from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer
-from adversarial_lcd_ros.messages import MAX_LOGIT
+from adversarial_lcd_ros.messages.types import MAX_LOGIT
 from adversarial_lcd_ros.shown import Shown
 
 

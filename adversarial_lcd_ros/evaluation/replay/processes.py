@@ -9,7 +9,6 @@ from pathlib import Path
 
 import yaml
 
-from adversarial_lcd_ros.codec import decode_attack_report, decode_graph, decode_loop_closure
 from adversarial_lcd_ros.compiled.caching import code_folder
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.evaluation.replay.domain import VARIABLE
@@ -20,7 +19,12 @@ from adversarial_lcd_ros.evaluation.replay.supervision import (
     ended_together,
 )
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.codec import (
+    decode_attack_report,
+    decode_graph,
+    decode_loop_closure,
+)
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.paths import share_path
 from adversarial_lcd_ros.sequences.replay import read_payloads
 

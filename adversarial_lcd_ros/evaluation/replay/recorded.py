@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import decode_attack_report, decode_graph, decode_loop_closure
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
@@ -25,7 +24,12 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
 from adversarial_lcd_ros.ground_truth.labels import unlabelled
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.codec import (
+    decode_attack_report,
+    decode_graph,
+    decode_loop_closure,
+)
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bag_truth import BagTruth

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
 from adversarial_lcd_ros.files.reading import csv_rows
 from adversarial_lcd_ros.files.writing import plain_cell, write_csv
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 CLEAN = 'clean'
 _KINDS = {'positive': POSITIVE, 'negative': NEGATIVE}

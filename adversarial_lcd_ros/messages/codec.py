@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.checks import (
+from adversarial_lcd_ros.config import MessageLimits
+from adversarial_lcd_ros.errors import CodecError, GraphError
+from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, MultiTierGraph
+from adversarial_lcd_ros.messages.checks import (
     check_decision,
     check_graph,
     check_probability,
@@ -21,10 +24,13 @@ from adversarial_lcd_ros.checks import (
     checked_name,
     checked_stamp_ns,
 )
-from adversarial_lcd_ros.config import MessageLimits
-from adversarial_lcd_ros.errors import CodecError, GraphError
-from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, MultiTierGraph
-from adversarial_lcd_ros.messages import (
+from adversarial_lcd_ros.messages.schemas import MESSAGES as MESSAGES
+from adversarial_lcd_ros.messages.schemas import dump as _dump
+from adversarial_lcd_ros.messages.schemas import load, schema_version
+from adversarial_lcd_ros.messages.schemas import message_type as _type
+from adversarial_lcd_ros.messages.schemas import schema_text as schema_text
+from adversarial_lcd_ros.messages.schemas import typestore as typestore
+from adversarial_lcd_ros.messages.types import (
     AttackReport,
     FrameDetections,
     LcdAnswer,
@@ -33,12 +39,6 @@ from adversarial_lcd_ros.messages import (
     log_odds,
 )
 from adversarial_lcd_ros.paths import PACKAGE
-from adversarial_lcd_ros.schemas import MESSAGES as MESSAGES
-from adversarial_lcd_ros.schemas import dump as _dump
-from adversarial_lcd_ros.schemas import load, schema_version
-from adversarial_lcd_ros.schemas import message_type as _type
-from adversarial_lcd_ros.schemas import schema_text as schema_text
-from adversarial_lcd_ros.schemas import typestore as typestore
 
 # What a command reads: bags of one's own may hold larger graphs than a node takes in by default.
 LIMITS = MessageLimits(max_nodes=100_000, max_edges=10_000_000, max_words=1_000_000,

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from adversarial_lcd_ros.codec import MAX_PAYLOAD_BYTES, typestore
 from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.messages.codec import MAX_PAYLOAD_BYTES, typestore
 
 WIRE_TYPE = 'std_msgs/msg/UInt8MultiArray'
 

@@ -14,7 +14,7 @@ from adversarial_lcd_ros.compiled import ranges
 from adversarial_lcd_ros.config import MessageLimits
 from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages import AttackReport, LoopClosure
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 STATUSES = ('success', 'failure', 'skipped')
 MAX_NAME = 256

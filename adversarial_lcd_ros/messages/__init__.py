@@ -1,0 +1,1 @@
+"""What the topics carry: types, their bytes, and the checks between."""
