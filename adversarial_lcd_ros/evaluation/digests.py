@@ -1,12 +1,12 @@
-"""Digests by which finished work is told from work to do."""
+"""Digests of the files that figures rest on."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-import hashlib
 from pathlib import Path
 
 from adversarial_lcd_ros.errors import FileError, ModelError
+from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.files.reading import read_bytes
 
 
@@ -17,8 +17,3 @@ def file_digest(path: Path) -> str:
         return digest_of(read_bytes(path))
     except FileError as error:
         raise ModelError(f'{error}; name a file that "adversarial-lcd train" wrote') from error
-
-
-def digest_of(data: bytes) -> str:
-    """Return the digest of some bytes, hexadecimal."""
-    return hashlib.blake2b(data, digest_size=16).hexdigest()

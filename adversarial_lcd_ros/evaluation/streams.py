@@ -10,6 +10,7 @@ from pathlib import Path
 
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
@@ -158,8 +159,7 @@ def graphs_digest(graphs: Iterable[MultiTierGraph]) -> str:
 
 def _with_labels(graphs: str, labels: FrameLabels) -> str:
     arrays = (labels.kind, labels.possible, labels.elsewhere, labels.candidates)
-    return hashlib.blake2b(graphs.encode() + b''.join(array.tobytes() for array in arrays),
-                           digest_size=16).hexdigest()
+    return digest_of(graphs.encode() + b''.join(array.tobytes() for array in arrays))
 
 
 @lru_cache(_KEPT)

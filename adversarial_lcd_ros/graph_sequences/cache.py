@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Several
 from dataclasses import asdict
-import hashlib
 import json
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.errors import CodecError, EvaluationError, FileError, ModelError
 from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.files.digests import digest_of_parts
 from adversarial_lcd_ros.files.network import MAX_NETWORK_BYTES
 from adversarial_lcd_ros.files.reading import read_bytes
 from adversarial_lcd_ros.files.writing import replacing
@@ -60,11 +60,7 @@ def cache_key(sequence: Sequence, numbers: range, config: BuilderConfig) -> str:
         sequence.stamps_ns[numbers.start:numbers.stop].tobytes(), first.data,
         schema_text('MultiTierGraph').encode(),
         code_digest(*_CODE).encode(), *(_bytes(path) for path in _named_files(config))]
-    digest = hashlib.blake2b(digest_size=16)
-    for part in parts:
-        # With its length, so that no two lists of parts run into the same bytes.
-        digest.update(len(part).to_bytes(8, 'little') + part)
-    return digest.hexdigest()
+    return digest_of_parts(parts)
 
 
 def _named_files(config: BuilderConfig) -> list[Path]:

@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-import hashlib
 import logging
 import os
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
+from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.cache import cache_key, load_graphs, save_graphs
 from adversarial_lcd_ros.messages.codec import decode_graph
@@ -195,7 +195,7 @@ def _converted(labels: Path, sequence: Sequence) -> Path:
         with tempfile.TemporaryDirectory(prefix='.labels-', dir=folder) as hidden:
             work = Path(hidden) / 'detections.csv'
             convert_labels(labels, sequence, work)
-            path = folder / f'{hashlib.blake2b(work.read_bytes(), digest_size=16).hexdigest()}.csv'
+            path = folder / f'{digest_of(work.read_bytes())}.csv'
             os.replace(work, path)
     except OSError as error:
         raise EvaluationError(f'detections cannot be kept in {folder} ({error}): set '

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import hashlib
-import os
 from pathlib import Path
-import tempfile
 from typing import TYPE_CHECKING
 from zipfile import BadZipFile
 
@@ -14,7 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import EvaluationError, FileError
+from adversarial_lcd_ros.files.digests import digest_of_parts
+from adversarial_lcd_ros.files.writing import replacing
 from adversarial_lcd_ros.ground_truth.audit import Sightings
 from adversarial_lcd_ros.ground_truth.focal import Focal
 from adversarial_lcd_ros.paths import cache_folder
@@ -43,14 +42,10 @@ def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
     The source, stamps and poses of the frames, which of them are compared, the first picture as
     recorded, the code, and the libraries below it.
     """
-    digest = hashlib.blake2b(digest_size=16)
     arrays = (rows.stamp_ns, rows.position, rows.quaternion, candidates, located)
     versions = f'{source.resolve()} {focal_length} {np.__version__} {cv2.__version__}'.encode()
-    for part in (versions, first, *(array.tobytes() for array in arrays),
-                 *(path.read_bytes() for path in _CODE)):
-        # With its length, so that no two lists of parts run into the same bytes.
-        digest.update(len(part).to_bytes(8, 'little') + part)
-    return digest.hexdigest()
+    return digest_of_parts((versions, first, *(array.tobytes() for array in arrays),
+                            *(path.read_bytes() for path in _CODE)))
 
 
 def load(key: str) -> Audit | None:
@@ -77,14 +72,12 @@ def save(key: str, audit: Audit) -> None:
     path = _path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix='.labels-', dir=path.parent) as hidden:
-            work = Path(hidden) / path.name
-            np.savez_compressed(work, count=audit.sightings.count.astype(np.uint16),
+        with replacing(path) as stream:
+            np.savez_compressed(stream, count=audit.sightings.count.astype(np.uint16),
                                 features=audit.sightings.features,
                                 covered=audit.sightings.covered,
                                 focal=audit.focal.share, focal_from=audit.focal.source)
-            os.replace(work, path)
-    except OSError as error:
+    except (OSError, FileError) as error:
         raise EvaluationError(f'labels cannot be kept in {path.parent} ({error}): set '
                               'ADVERSARIAL_LCD_CACHE to another folder') from error
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
-import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 
 from adversarial_lcd_ros import sequences
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.digests import digest_of_parts
 from adversarial_lcd_ros.paths import cache_folder
 from adversarial_lcd_ros.sequences.bag_truth import TRUTH_FILE, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import (
@@ -81,7 +81,8 @@ def imported(source: Path, options: Mapping[str, Any], *,
         raise SequenceError(f'there is no sequence {source}')
     if not options and is_imported(source):
         return source
-    bag = cache_folder() / IMPORTS / _digest(source, options) / source.resolve().stem
+    made_of = digest_of_parts(_parts(source, options))
+    bag = cache_folder() / IMPORTS / made_of / source.resolve().stem
     if (bag / METADATA).is_file():
         tell(f'{source} was imported before: {bag}')
         return bag
@@ -99,14 +100,6 @@ def imported(source: Path, options: Mapping[str, Any], *,
 
 def _no_bar(title: str) -> AbstractContextManager[Progress]:
     return nullcontext(lambda done, total: None)
-
-
-def _digest(source: Path, options: Mapping[str, Any]) -> str:
-    digest = hashlib.blake2b(digest_size=16)
-    for part in _parts(source, options):
-        # With its length, so that no two lists of parts run into the same bytes.
-        digest.update(len(part).to_bytes(8, 'little') + part)
-    return digest.hexdigest()
 
 
 def _parts(source: Path, options: Mapping[str, Any]) -> Iterator[bytes]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.digests import file_digest
 from adversarial_lcd_ros.evaluation.metrics import (
     Metrics,
     first_closure_latency_s,
@@ -30,6 +30,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs

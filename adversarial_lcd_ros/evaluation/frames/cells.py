@@ -15,8 +15,9 @@ from typing import Any
 from adversarial_lcd_ros.attack.surrogate_data import data_path
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig, names_in
 from adversarial_lcd_ros.environment import code_digest, named_code_digest
-from adversarial_lcd_ros.evaluation.digests import digest_of, file_digest
+from adversarial_lcd_ros.evaluation.digests import file_digest
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, attack_columns, method_of
+from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.lcd.targets import decision_path
 from adversarial_lcd_ros.registry import YARDSTICKS
 

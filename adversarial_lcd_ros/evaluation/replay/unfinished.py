@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 import fcntl
-import hashlib
 import json
 import os
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 from adversarial_lcd_ros.config import Config
 from adversarial_lcd_ros.environment import code_digest, environment, named_code_digest
 from adversarial_lcd_ros.evaluation.results import PARTIAL, ResultsFolder
+from adversarial_lcd_ros.files.digests import digest_of
 
 RECORDINGS = 'recordings'
 _PLAN, _FINISHED = 'plan.json', 'finished.json'
@@ -50,7 +50,7 @@ def plan_digest(bag: Path, sections: Mapping[str, Config | None], rebuild: bool)
              'files': {path: _stamps(Path(path)) for path in sorted({str(bag.resolve()), *named})},
              'python': here['python'], 'versions': here['versions'],
              'code': [code_digest(*_ROOMS), *(named_code_digest(name) for name in own)]}
-    return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=16).hexdigest()
+    return digest_of(json.dumps(parts, sort_keys=True).encode())
 
 
 def _stamps(path: Path) -> list[tuple[str, int, int]]:
