@@ -11,13 +11,14 @@ from pathlib import Path
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, Progress, open_graphs
+from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, open_graphs
 from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.importing import pose_messages
 from adversarial_lcd_ros.sequences.part import SequencePart, terms_of
 from adversarial_lcd_ros.sequences.replay import payload_schemas
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 # What the detector hears, and what goes to an attacker first.
 GRAPH_TOPIC, CLEAN_TOPIC = '/graph', '/graph_clean'

@@ -28,11 +28,11 @@ from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.sequences.replay import Replay, read_payloads
+from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.sequences.yolo_labels import convert_labels
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 FRAMES_AT_ONCE = 2
-Progress = Callable[[int, int], None]
 ItemT = TypeVar('ItemT')
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,8 @@ from adversarial_lcd_ros.compiled import sightings
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.motion_depth import Camera, inverse_depths
-from adversarial_lcd_ros.ground_truth.view_features import Progress, ViewFeatures
+from adversarial_lcd_ros.ground_truth.view_features import ViewFeatures
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 # A match may be this far from where the poses put it; a segment that is searched at most so
 # long. Shares of the image width.

@@ -19,7 +19,6 @@ from adversarial_lcd_ros.ground_truth.depth import DepthImages, find_depth, shar
 from adversarial_lcd_ros.ground_truth.evidence import Evidence, from_shares
 from adversarial_lcd_ros.ground_truth.focal import Focal, measure_focal
 from adversarial_lcd_ros.ground_truth.labels import (
-    PLACE_INDEX,
     FrameLabels,
     count_old_enough,
     label_frames,
@@ -29,15 +28,15 @@ from adversarial_lcd_ros.ground_truth.labels import (
 from adversarial_lcd_ros.ground_truth.motion_depth import Camera
 from adversarial_lcd_ros.ground_truth.overlap import rotations, visible_points
 from adversarial_lcd_ros.ground_truth.view_features import (
-    Progress,
     ViewFeatures,
     from_graphs,
     from_pictures,
 )
-from adversarial_lcd_ros.sequences import Frame, open_sequence
+from adversarial_lcd_ros.sequences import PLACE_INDEX, Frame, open_sequence
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, BagFile, is_bag
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences import Trajectory

@@ -4,14 +4,14 @@ Which frames and pairs of frames are loops, from ground truth only (docs/evaluat
 Two questions are kept apart. A *pair* of frames shows the same place, different places, or
 something between (``relation``, for the pair protocol). A *frame* of a replay has a loop to be
 found among its earlier frames, has none, or lies between (``label_frames``, for the live one).
-What two views share is told by evidence (``evidence``), or guessed from poses (``overlap``).
+What two views share is told by evidence (``evidence``), or guessed from poses (``overlap``);
+``judgement`` has both.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,14 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
-from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
-
-if TYPE_CHECKING:
-    from adversarial_lcd_ros.sequences import Trajectory
+from adversarial_lcd_ros.ground_truth.judgement import Judgement, judge_evidence, judge_poses
+from adversarial_lcd_ros.sequences import Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
 NO_MATCH = -1
-PLACE_INDEX = 'place_index'
 # The relation of all pairs takes a few bytes a pair: 20,000 frames are about 1.6 GB.
 MAX_FRAMES = 20_000
 
@@ -108,19 +105,6 @@ class FrameLabels:
         return right
 
 
-@dataclass(frozen=True, eq=False)
-class _Judgement:
-    # Symmetric (n, n) bool: a loop but for time; may rightly be named; that by a change of scale;
-    # wrongly named; a pair of different places; a camera that came from one to the other has
-    # left in between.
-    near: NDArray[np.bool_]
-    possible: NDArray[np.bool_]
-    scaled: NDArray[np.bool_]
-    wrong: NDArray[np.bool_]
-    far: NDArray[np.bool_]
-    left: NDArray[np.bool_]
-
-
 def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
                  config: LabelConfig, evidence: Evidence | None = None) -> FrameLabels:
     """
@@ -154,11 +138,11 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     """
     stamps = _checked_stamps(stamp_ns)
     rows, located = located_poses(trajectory, stamps, config)
-    judgement = (_judge(rows, image_size, config) if evidence is None
-                 else _by_evidence(evidence))
+    judgement = (judge_poses(rows, image_size, config) if evidence is None
+                 else judge_evidence(evidence))
     known = located[:, None] & located[None, :]
-    judgement = _Judgement(*(getattr(judgement, part.name) & known
-                             for part in fields(judgement)))
+    judgement = Judgement(*(getattr(judgement, part.name) & known
+                            for part in fields(judgement)))
     candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
     return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
@@ -216,7 +200,8 @@ def relation(rows: Trajectory, image_size: tuple[int, int],
 
     """
     stamps = _checked_stamps(rows.stamp_ns)
-    return _relation(_judge(rows, image_size, config), count_old_enough(stamps, config.min_gap_s))
+    return _relation(judge_poses(rows, image_size, config),
+                     count_old_enough(stamps, config.min_gap_s))
 
 
 def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
@@ -251,29 +236,6 @@ def count_old_enough(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.
     return count
 
 
-def _by_evidence(evidence: Evidence) -> _Judgement:
-    return _Judgement(evidence.loop, evidence.shared, evidence.scaled, evidence.elsewhere,
-                      evidence.elsewhere, evidence.left)
-
-
-def _judge(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig) -> _Judgement:
-    none = np.zeros((len(rows.position),) * 2, bool)
-    if rows.frame_id == PLACE_INDEX:
-        apart = np.abs(rows.position[:, :1] - rows.position[:, 0])
-        possible = apart < config.negative_index
-        return _Judgement(apart <= config.positive_index, possible, none, ~possible, ~possible,
-                          ~possible)
-    near, far = _by_distance(rows, config)
-    if config.rule == 'distance':
-        # Within a room a camera is never far by this rule: to leave is to be no longer near.
-        return _Judgement(near, ~far, none, far, far, ~near)
-    seen = visible_points(rows.position, rows.quaternion, image_size, config.focal_length)
-    mutual, either = np.minimum(seen, seen.T), np.maximum(seen, seen.T)
-    possible = mutual >= config.possible_overlap * GRID_POINTS
-    return _Judgement(near & (mutual >= config.positive_overlap * GRID_POINTS), possible, none,
-                      ~possible, either < config.negative_overlap * GRID_POINTS, ~possible)
-
-
 def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelConfig
                  ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """
@@ -285,30 +247,11 @@ def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelCon
         See ``relation``.
 
     """
-    judgement = _judge(rows, image_size, replace(config, rule='overlap'))
+    judgement = judge_poses(rows, image_size, replace(config, rule='overlap'))
     return judgement.near, judgement.left
 
 
-def _by_distance(rows: Trajectory,
-                 config: LabelConfig) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    count = len(rows.position)
-    unit = rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True)
-    near, far = np.zeros((count, count), bool), np.zeros((count, count), bool)
-    for start in range(0, count, 256):  # bounds the float64 scratch memory
-        block = slice(start, start + 256)
-        offset = rows.position[block, None, :] - rows.position[None, :, :]
-        distance = np.sqrt(np.einsum('ijk,ijk->ij', offset, offset))
-        # Rotations are an angle apart of which half has the cosine |q_i . q_j|.
-        cosine = np.minimum(np.abs(unit[block] @ unit.T), 1.0)
-        angle = np.degrees(2.0 * np.arccos(cosine))
-        near[block] = ((distance <= config.positive_distance_m)
-                       & (angle <= config.positive_angle_deg))
-        far[block] = ((distance >= config.negative_distance_m)
-                      | (angle >= config.negative_angle_deg))
-    return near, far
-
-
-def _relation(judgement: _Judgement, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
+def _relation(judgement: Judgement, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
     count = len(candidates)
     index = np.arange(count)
     # The newest earlier frame that looked elsewhere: a loop partner must be older than that.

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.ground_truth.view_features import Progress, ViewFeatures, match
+from adversarial_lcd_ros.ground_truth.view_features import ViewFeatures, match
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 # Nothing is nearer than this to a camera, metres.
 NEAREST_M = 0.3

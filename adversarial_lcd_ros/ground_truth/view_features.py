@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,6 @@ from adversarial_lcd_ros.vision.features import FeatureExtractor, spread, to_gre
 
 # Features of a picture: found, with a low threshold so that plain walls have some, and kept.
 FOUND, FAST_THRESHOLD, KEPT = 2000, 7, 600
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 import heapq
 from pathlib import Path
@@ -17,7 +17,7 @@ from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE,
 from adversarial_lcd_ros.sequences.cdr import header
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
-from adversarial_lcd_ros.sequences.sequence import Coverage, Sequence
+from adversarial_lcd_ros.sequences.sequence import Coverage, Progress, Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
@@ -46,7 +46,7 @@ class ImportSummary:
 
 
 def import_sequence(source: Path | str, destination: Path | str, *,
-                    progress: Callable[[int, int], None] | None = None, overwrite: bool = False,
+                    progress: Progress | None = None, overwrite: bool = False,
                     topic: str | None = None, ground_truth: Path | str | None = None,
                     rate_hz: float | None = None, camera: str | None = None, raw_as: str = JPEG,
                     truth: TruthOptions | None = None,
@@ -125,7 +125,7 @@ def _terms(source: Path) -> list[Path]:
 
 
 def _counted(frames: Iterator[Frame], total: int, raw_as: str,
-             progress: Callable[[int, int], None] | None) -> Iterator[Frame]:
+             progress: Progress | None) -> Iterator[Frame]:
     for done, frame in enumerate(frames, 1):
         frame.image()
         yield frame.compressed(raw_as)

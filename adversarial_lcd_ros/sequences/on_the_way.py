@@ -29,13 +29,12 @@ from adversarial_lcd_ros.sequences.importing import (
     IMAGE_TOPIC,
     import_sequence,
 )
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 IMPORTS = 'imports'
 # The topics that the nodes listen to.
 _REPLAYED = {'/image', IMAGE_TOPIC, GROUND_TRUTH_TOPIC}
 _BLOCK = 1 << 20
-
-Progress = Callable[[int, int], None]
 
 
 def is_imported(path: Path) -> bool:

@@ -14,6 +14,9 @@ from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.frame import Frame
 from adversarial_lcd_ros.sequences.trajectory import TOLERANCE_NS, Trajectory
 
+# Called with how many of how many frames, or other steps, are done.
+Progress = Callable[[int, int], None]
+
 
 @dataclass(frozen=True)
 class Coverage:

@@ -16,7 +16,6 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 from adversarial_lcd_ros.lcd.decision import Decision
@@ -24,6 +23,7 @@ from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.scoring import Scoring, prepared
 from adversarial_lcd_ros.messages.types import LcdQuery
+from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.training.networks import make_trainer
 from adversarial_lcd_ros.training.pair_scores import (
     LabelledPairs,

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.targets.gnn import INPUTS, OUTPUT, network_inputs
 from adversarial_lcd_ros.lcd.views import View, match_nodes
+from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.training.networks import Trainer
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs
 

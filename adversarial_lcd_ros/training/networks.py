@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.registry import load
+from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs
 
 

@@ -13,11 +13,11 @@ from sklearn.preprocessing import StandardScaler
 
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.keyframes.database import Database
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.lcd.scoring import Scoring
 from adversarial_lcd_ros.lcd.views import View
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig,
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.files.writing import write_json
-from adversarial_lcd_ros.graph_sequences.opening import Progress
 from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.sequences.part import SequencePart
+from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.training.decisions import (
     TrainingSequence,
     collect_surrogate_data,

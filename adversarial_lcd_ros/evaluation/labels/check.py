@@ -13,7 +13,7 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.covisibility import find_covisibility, read_covisibility
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
-from adversarial_lcd_ros.ground_truth.view_features import Progress
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 
 def check_labels(views: Views, config: LabelConfig,

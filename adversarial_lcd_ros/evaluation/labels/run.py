@@ -20,10 +20,10 @@ from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import Labelled, Views, label_views
 from adversarial_lcd_ros.ground_truth.labels import POSITIVE, FrameLabels
-from adversarial_lcd_ros.ground_truth.view_features import Progress
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 KIND, SCHEMA = 'labels', 1
 _LOOKED_AT = 4  # kinds of which pairs are shown: the first ones
