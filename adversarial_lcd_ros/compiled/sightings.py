@@ -22,6 +22,8 @@ MIRRORED = 3
 _NEAREST_M = 0.05
 # A point is hidden, or agrees, by this share of the depths around and this many metres.
 _DEPTH_SHARE, _DEPTH_M = 0.15, 0.05
+# What is known around a place says of a point seen there.
+_BEFORE, _AGREES, _HIDDEN = range(3)
 
 
 @compiled
@@ -106,6 +108,44 @@ def _found(u: float, v: float, across: float, down: float, position: Any, start:
 
 
 @compiled
+def _segment(ray: Any, offset: Any, near: float, far: float, camera: tuple[float, float, float]
+             ) -> tuple[bool, float, float, float, float, float, float]:
+    # Whether any of a ray is before the other camera; between which inverse depths, and where
+    # these are seen: the far end, and how far the near one lies across and down, pixels.
+    width, height, focal = camera
+    low, high = far, near
+    first, last = ray[2] + low * offset[2], ray[2] + high * offset[2]
+    if first < _NEAREST_M and last < _NEAREST_M:
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if first < _NEAREST_M:
+        low += (high - low) * (_NEAREST_M - first) / (last - first)
+    elif last < _NEAREST_M:
+        high = low + (high - low) * (_NEAREST_M - first) / (last - first)
+    first, last = ray[2] + low * offset[2], ray[2] + high * offset[2]
+    u = (ray[0] + low * offset[0]) / first * focal + width / 2
+    v = (ray[1] + low * offset[1]) / first * focal + height / 2
+    across = (ray[0] + high * offset[0]) / last * focal + width / 2 - u
+    down = (ray[1] + high * offset[1]) / last * focal + height / 2 - v
+    return True, low, high, u, v, across, down
+
+
+@compiled
+def _looks_alike(ray: Any, middle: Any, zoom: float, steepest: float) -> bool:
+    # Whether a point is seen from so near a direction and distance that its picture may match.
+    straight = middle[0] * ray[0] + middle[1] * ray[1] + middle[2] * ray[2]
+    bent = straight < steepest * np.sqrt((middle * middle).sum() * (ray * ray).sum())
+    return not bent and 1 / zoom < middle[2] < zoom
+
+
+@compiled
+def _against_depth(least: float, most: float, known: Any) -> int:
+    # Of the near and the far end, the one that agrees or is not hidden counts.
+    if least > known[1] * (1 + _DEPTH_SHARE) + _DEPTH_M:
+        return _HIDDEN
+    return _AGREES if most > known[0] / (1 + _DEPTH_SHARE) - _DEPTH_M else _BEFORE
+
+
+@compiled
 def count_sightings(pairs: NDArray[np.int64], position: NDArray[np.float32],
                     descriptor: NDArray[np.uint64], count: NDArray[np.int64],
                     near: NDArray[np.float32], far: NDArray[np.float32],
@@ -143,6 +183,10 @@ def count_sightings(pairs: NDArray[np.int64], position: NDArray[np.float32],
         Largest distance from the segment, pixels.
     longest : float
         Longest segment that is looked along, pixels.
+    zoom : float
+        Largest change of scale at which a feature still looks alike.
+    steepest : float
+        Cosine of the largest angle between the two directions it is seen from.
     bits : int
         Largest Hamming distance of descriptors that look alike.
 
@@ -168,39 +212,26 @@ def count_sightings(pairs: NDArray[np.int64], position: NDArray[np.float32],
             x = (position[i, k, 0] - width / 2) / focal
             y = (position[i, k, 1] - height / 2) / focal
             ray = between[:, 0] * x + between[:, 1] * y + between[:, 2]
-            low, high = far[i, k], near[i, k]
-            first, last = ray[2] + low * offset[2], ray[2] + high * offset[2]
-            if first < _NEAREST_M and last < _NEAREST_M:
+            ahead, low, high, u, v, across, down = _segment(ray, offset, near[i, k], far[i, k],
+                                                            camera)
+            if not ahead:
                 continue
-            if first < _NEAREST_M:
-                low += (high - low) * (_NEAREST_M - first) / (last - first)
-            elif last < _NEAREST_M:
-                high = low + (high - low) * (_NEAREST_M - first) / (last - first)
-            first, last = ray[2] + low * offset[2], ray[2] + high * offset[2]
-            u = (ray[0] + low * offset[0]) / first * focal + width / 2
-            v = (ray[1] + low * offset[1]) / first * focal + height / 2
-            across = (ray[0] + high * offset[0]) / last * focal + width / 2 - u
-            down = (ray[1] + high * offset[1]) / last * focal + height / 2 - v
             begin, end = _clip(u, v, across, down, width, height)
             if begin > end:
                 continue
             u, v = u + begin * across, v + begin * down
             across, down = (end - begin) * across, (end - begin) * down
             is_long = across * across + down * down > longest * longest
-            middle = ray + (low + high) / 2 * offset
-            scale = middle[2]
-            bent = ((middle[0] * ray[0] + middle[1] * ray[1] + middle[2] * ray[2])
-                    < steepest * np.sqrt((middle * middle).sum() * (ray * ray).sum()))
-            is_alike = not bent and 1 / zoom < scale < zoom
+            is_alike = _looks_alike(ray, ray + (low + high) / 2 * offset, zoom, steepest)
             column = min(int((u + across / 2) / CELL_PX), columns - 1)
             row = min(int((v + down / 2) / CELL_PX), rows - 1)
             if not is_long and depth[j, row, column, 1] > 0:
-                # Of the near and the far end, the one that agrees or is not hidden counts.
-                least = last / high if high > 0 else np.inf
-                most = first / low if low > 0 else np.inf
-                if least > depth[j, row, column, 1] * (1 + _DEPTH_SHARE) + _DEPTH_M:
+                least = (ray[2] + high * offset[2]) / high if high > 0 else np.inf
+                most = (ray[2] + low * offset[2]) / low if low > 0 else np.inf
+                against = _against_depth(least, most, depth[j, row, column])
+                if against == _HIDDEN:
                     continue
-                if most > depth[j, row, column, 0] / (1 + _DEPTH_SHARE) - _DEPTH_M:
+                if against == _AGREES:
                     result[pair, AGREEING] += 1
                     if not is_alike:
                         result[pair, UNTESTED] += 1
@@ -209,9 +240,9 @@ def count_sightings(pairs: NDArray[np.int64], position: NDArray[np.float32],
                 continue
             result[pair, TESTED] += 1
             for mirror in range(MIRRORED + 1):
-                at, ahead = (width - u, -across) if mirror & 1 else (u, across)
+                at, along = (width - u, -across) if mirror & 1 else (u, across)
                 below, beneath = (height - v, -down) if mirror & 2 else (v, down)
-                if _found(at, below, ahead, beneath, position[j], start[j], order[j],
+                if _found(at, below, along, beneath, position[j], start[j], order[j],
                           descriptor[j], descriptor[i, k], columns, rows, radius, bits):
                     result[pair, BY_CHANCE if mirror else FOUND] += 1
     return result
