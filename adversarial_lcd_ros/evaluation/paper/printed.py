@@ -57,10 +57,6 @@ class PrintedTable:
         """Return the average that the printed cells of a method give."""
         return float(np.mean(self.columns[method]))
 
-    def with_average(self) -> dict[str, tuple[float, ...]]:
-        """Return the columns with the printed average as one more row, as the paper ranked."""
-        return {name: (*cells, self.averages[name]) for name, cells in self.columns.items()}
-
     def corrected(self, method: str, row: str, value: float) -> PrintedTable:
         """
         Return the table with another value in one cell and the average that follows.
@@ -78,17 +74,6 @@ class PrintedTable:
         mean = round(float(np.mean(cells)), 2)
         return replace(self, columns={**self.columns, method: cells},
                        averages={**self.averages, method: mean})
-
-
-@dataclass(frozen=True)
-class AutorankRow:
-    """A row of the printed Autorank table (Table 4), two decimals cut off, not rounded."""
-
-    mean_rank: float  # larger is better, unlike Demsar's
-    median: float
-    mad: float
-    interval: tuple[float, float]
-    gamma: float
 
 
 @dataclass(frozen=True)
@@ -129,12 +114,6 @@ BUDGET_TABLE = PrintedTable(
     PERTURBATION_TABLE.settings)
 PRINTED_TABLES = (SURROGATE_TABLE, PERTURBATION_TABLE, BUDGET_TABLE)
 
-AUTORANK_TABLE = {  # Table 4, tab:autorank
-    OURS: AutorankRow(3.83, -27.19, 1.83, (-27.9, -26.4), 0.0),
-    'Bayesian': AutorankRow(3.00, -24.37, 1.99, (-24.9, -23.7), -0.9),
-    'SVM-poly': AutorankRow(2.16, -19.41, 0.48, (-19.7, -19.1), -3.9),
-    'SVM-linear': AutorankRow(1.00, -13.56, 0.44, (-13.8, -13.2), -6.8)}
-
 # "surpassing SVM-linear by 12.6%, SVM-polynomial by 7.3%, and Bayesian classifier by 2.7%", and
 # so on (Sec. 4.2 and 4.3): by how much the text says that the paper's method is ahead on average.
 CLAIMED_LEADS = {3: {'SVM-linear': 12.6, 'SVM-poly': 7.3, 'Bayesian': 2.7},
@@ -144,11 +123,6 @@ CLAIMED_LEADS = {3: {'SVM-linear': 12.6, 'SVM-poly': 7.3, 'Bayesian': 2.7},
 # One cell that, if printed wrongly, explains the lead in the text and the whole of Table 4.
 # Our inference: the paper does not say so.
 REPAIR = ('SVM-poly', 'garden', -19.89)
-
-
-def repaired_surrogate_table() -> PrintedTable:
-    """Return Table 3 with the cell that explains Table 4 (our inference)."""
-    return SURROGATE_TABLE.corrected(*REPAIR)
 
 
 def misprints() -> list[Misprint]:

@@ -1,5 +1,6 @@
 """The paper's printed statistics, from its printed cells."""
 
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -8,15 +9,40 @@ from scipy.stats import binom
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.paper.printed import (
-    AUTORANK_TABLE,
     BUDGET_TABLE,
     OURS,
     PERTURBATION_TABLE,
+    REPAIR,
     SURROGATE_TABLE,
     misprints,
-    repaired_surrogate_table,
 )
 from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
+
+# Table 3 with the cell that explains Table 4 (our inference).
+REPAIRED_TABLE = SURROGATE_TABLE.corrected(*REPAIR)
+
+
+@dataclass(frozen=True)
+class AutorankRow:
+    """A row of the printed Autorank table (Table 4), two decimals cut off, not rounded."""
+
+    mean_rank: float  # larger is better, unlike Demsar's
+    median: float
+    mad: float
+    interval: tuple[float, float]
+    gamma: float
+
+
+AUTORANK_TABLE = {  # Table 4, tab:autorank
+    OURS: AutorankRow(3.83, -27.19, 1.83, (-27.9, -26.4), 0.0),
+    'Bayesian': AutorankRow(3.00, -24.37, 1.99, (-24.9, -23.7), -0.9),
+    'SVM-poly': AutorankRow(2.16, -19.41, 0.48, (-19.7, -19.1), -3.9),
+    'SVM-linear': AutorankRow(1.00, -13.56, 0.44, (-13.8, -13.2), -6.8)}
+
+
+def with_average(table):
+    """Columns with the printed average as one more row, as the paper ranked."""
+    return {name: (*cells, table.averages[name]) for name, cells in table.columns.items()}
 
 
 def ranking_of(columns):
@@ -44,19 +70,19 @@ def printed(name):
 
 def test_six_rows_reproduce_the_printed_autorank_table():
     """Five data sets and their own average, with the one cell repaired: every figure agrees."""
-    computed = autorank_of(repaired_surrogate_table().with_average())
+    computed = autorank_of(with_average(REPAIRED_TABLE))
     assert list(computed) == list(AUTORANK_TABLE)
     assert computed == {name: printed(name) for name in AUTORANK_TABLE}
 
 
 def test_five_rows_do_not_reproduce_it():
-    for table in (SURROGATE_TABLE, repaired_surrogate_table()):
+    for table in (SURROGATE_TABLE, REPAIRED_TABLE):
         computed = autorank_of(table.columns)
         assert [name for name in computed if computed[name] == printed(name)] == []
 
 
 def test_printed_cells_alone_miss_where_the_misprint_is():
-    computed = autorank_of(SURROGATE_TABLE.with_average())
+    computed = autorank_of(with_average(SURROGATE_TABLE))
     assert computed['SVM-linear'] == printed('SVM-linear')
     assert computed[OURS] == printed(OURS)
     # Medians do not depend on the misprint in another column, ranks do.
@@ -66,7 +92,7 @@ def test_printed_cells_alone_miss_where_the_misprint_is():
 
 
 def test_printed_intervals_are_the_two_middle_values_of_six():
-    for name, cells in repaired_surrogate_table().with_average().items():
+    for name, cells in with_average(REPAIRED_TABLE).items():
         middle = sorted(cells)[2:4]
         assert AUTORANK_TABLE[name].interval == tuple(cut(cell, 1) for cell in middle)
     # Such an interval covers the median in 31 of 100 cases.
@@ -74,8 +100,8 @@ def test_printed_intervals_are_the_two_middle_values_of_six():
 
 
 @pytest.mark.parametrize(('columns', 'count', 'difference'), [
-    (repaired_surrogate_table().with_average(), 6, 1.915),
-    (repaired_surrogate_table().columns, 5, 2.098),
+    (with_average(REPAIRED_TABLE), 6, 1.915),
+    (REPAIRED_TABLE.columns, 5, 2.098),
     (SURROGATE_TABLE.columns, 5, 2.098)])
 def test_only_svm_linear_is_separated(columns, count, difference):
     """The paper: "a critical difference between Adversarial-LCD and the other algorithms"."""
@@ -112,7 +138,7 @@ def test_leads_claimed_in_the_text():
 
 
 def test_the_repair_explains_average_and_lead_but_not_the_printed_average():
-    table = repaired_surrogate_table()
+    table = REPAIRED_TABLE
     assert table.averages['SVM-poly'] == -19.10
     assert cut(table.mean('SVM-poly') - table.mean(OURS), 1) == 7.3
     assert SURROGATE_TABLE.averages['SVM-poly'] == -18.50  # neither -18.70 nor -19.10
