@@ -12,18 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
-from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.files.writing import write_json
-from adversarial_lcd_ros.lcd.decision import Decision
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.sequences.sequence import Progress
+from adversarial_lcd_ros.training.cards import decision_card, sequence_card, versions_card
 from adversarial_lcd_ros.training.decisions import (
     TrainingSequence,
     collect_surrogate_data,
@@ -52,7 +50,6 @@ FORMAT = 'adversarial_lcd_ros/model_card/1'
 TRAINING_LABELS = LabelConfig(min_gap_s=3.0, positive_overlap=0.45)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
-
 
 
 def default_targets() -> tuple[str, ...]:
@@ -174,13 +171,13 @@ def train(sources: Sequence[SequencePart], output: Path, *, seed: int = 42,
         surrogate = _write_surrogate_data(sequences[0], plan, seed, work, stage)
         card = {
             'format': FORMAT, 'seed': seed, 'command_line': list(command_line),
-            'sequences': [_sequence_card(source, sequence)
+            'sequences': [sequence_card(source, sequence)
                           for source, sequence in zip(opened, sequences, strict=True)],
             'vocabulary': vocabulary, 'targets': targets, 'surrogate_data': surrogate,
             'settings': {'builder': asdict(plan.builder), 'labels': asdict(plan.labels),
                          'lcd': asdict(plan.lcd), 'pairs': plan.pairs},
             'files': file_digests(work),
-            **_versions()}
+            **versions_card()}
         write_json(work / MODEL_CARD, card)
     return card
 
@@ -247,19 +244,8 @@ def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, 
                                       pairs=plan.pairs, seed=seed, progress=progress,
                                       network=work / network_file(name))
         decision.save(work / decision_file(name))
-        card[target] = _decision_card(decision)
+        card[target] = decision_card(decision)
     return card
-
-
-def _decision_card(decision: Decision) -> dict[str, Any]:
-    return {'weights': dict(zip(decision.channels, decision.weights, strict=True)),
-            'bias': decision.bias,
-            'training_pairs': [
-                {'loops': sequence['loops'], 'others': sequence['others'],
-                 'balanced_accuracy': accuracy}
-                for sequence, accuracy in zip(decision.card['sequences'],
-                                              decision.card['training_balanced_accuracy'],
-                                              strict=True)]}
 
 
 def _write_surrogate_data(sequence: TrainingSequence, plan: TrainingPlan, seed: int, work: Path,
@@ -277,25 +263,6 @@ def _write_surrogate_data(sequence: TrainingSequence, plan: TrainingPlan, seed: 
     return {'sequence': sequence.name, 'target': target, 'attack': asdict(attack),
             'flips_per_frame': plan.flips_per_frame, 'frames': len(data.word_score),
             'flips': len(data.gain), 'loops': int(data.word_loop.sum()), 'loop_bound': bound}
-
-
-def _sequence_card(source: TrainingFrames, sequence: TrainingSequence) -> dict[str, Any]:
-    sizes = np.array([(graph.node_count, graph.edge_count, graph.object_count)
-                      for graph in sequence.graphs], np.float64).mean(axis=0)
-    nodes, edges, objects = (float(size) for size in sizes)
-    return {'name': source.sequence.name, 'part': [source.source.start, source.source.stop],
-            'frames': len(source.numbers), 'first_frame': source.numbers[0],
-            'last_frame': source.numbers[-1], 'frames_in_all': source.sequence.frame_count,
-            'duration_s': float(source.stamps_ns[-1] - source.stamps_ns[0]) / 1e9,
-            'licence': source.licence, 'terms': list(source.terms),
-            'nodes_mean': nodes, 'edges_mean': edges, 'objects_mean': objects}
-
-
-def _versions() -> dict[str, Any]:
-    # Neither the time nor the machine: two trainings of the same give the same card.
-    found = environment()
-    return {'python': found['python'],
-            'versions': {**found['versions'], 'adversarial_lcd_ros': __version__}}
 
 
 def _counted(frames: Iterable[Any], total: int, progress: Progress) -> Iterator[Any]:
