@@ -117,7 +117,7 @@ def test_the_recipe_that_ships_and_what_overrides_it():
     ('attacks: [{search: recall}]', 'no attack with a name'),
     ('attacks: [{name: a, epsilon: 1}]', 'unknown setting epsilon'),
     ('attacks: [{name: a}, {name: a}]', 'taken'),
-    ('{', 'cannot be read'),
+    ('{', 'cannot be read as YAML'),
 ])
 def test_a_wrong_recipe_is_refused(tmp_path, text, said):
     path = tmp_path / 'recipe.yaml'

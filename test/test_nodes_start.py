@@ -53,7 +53,7 @@ def test_a_wrong_command_line_is_refused_with_exit_code_2(main, capsys, name, ar
 
 
 @pytest.mark.parametrize(('name', 'assignment', 'expected'), [
-    ('lcd', 'target:=best', 'expected one of wl'),
+    ('lcd', 'target:=best', 'there are: wl'),
     ('lcd', 'threshold:=1.5', 'expected 0.0 to 1.0'),
     ('lcd', 'candidates:=many', 'expected int, found str'),
     ('lcd', 'min_gap_s:=.nan', 'finite'),

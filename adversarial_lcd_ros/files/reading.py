@@ -186,7 +186,8 @@ def read_yaml(path: Path) -> Any:
             loader.dispose()
         check_value(value)
     except (yaml.YAMLError, ValueError, TypeError, OverflowError, RecursionError) as error:
-        raise FileError(f'{path}: {" ".join(str(error).split())}') from error
+        raise FileError(f'{path} cannot be read as YAML: {" ".join(str(error).split())}'
+                        ) from error
     return value
 
 

@@ -200,7 +200,8 @@ def _check_declared_size(data: bytes, what: str) -> None:
     try:
         width, height = picture_size(data, what)
     except CodecError as error:
-        raise SequenceError(str(error)) from error
+        raise SequenceError(f'{error}: it cannot be decoded; get the sequence again'
+                            ) from error
     if not 0 < width * height <= MAX_PIXELS:
         raise SequenceError(f'{what} declares {width} x {height} pixels: expected 1 to '
                             f'{MAX_PIXELS}')

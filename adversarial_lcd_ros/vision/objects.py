@@ -242,7 +242,7 @@ class ObjectDetector:
         found = found[~(found[:, 0] < 0)]
         self._check(heads.wrong_scores(found[:, 1]))
         found = found[found[:, 1] >= self._score]
-        self._check(heads.wrong_classes(found[:, 0]), heads.not_finite(found[:, 2:6]))
+        self._check(heads.wrong_classes(np.floor(found[:, 0])), heads.not_finite(found[:, 2:6]))
         return Detections.of(found[:, 0], found[:, 2:6], found[:, 1], width, height)
 
     def _letterboxed(self, image: NDArray[np.uint8], shape: tuple[int | None, ...]
@@ -277,9 +277,9 @@ class ObjectDetector:
     def _yolo_end_to_end(self, image: NDArray[np.uint8]) -> Detections:
         rows, scale, offset = self._letterboxed(image, (1, None, 6))
         self._check('a row for each cell' if heads.is_grid(len(rows), self._size) else '',
-                    heads.wrong_scores(rows[:, 4]), heads.wrong_classes(rows[:, 5]))
+                    heads.wrong_scores(rows[:, 4]))
         rows = rows[rows[:, 4] >= self._score]
-        self._check(heads.wrong_corners(rows[:, :4]))
+        self._check(heads.wrong_classes(rows[:, 5]), heads.wrong_corners(rows[:, :4]))
         return self._unboxed(np.round(rows[:, 5]), rows[:, :4], rows[:, 4], image, scale, offset)
 
     @staticmethod
