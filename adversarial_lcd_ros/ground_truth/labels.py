@@ -5,6 +5,10 @@ Two questions are kept apart. A *pair* of frames shows the same place, different
 something between (``relation``, for the pair protocol). A *frame* of a replay has a loop to be
 found among its earlier frames, has none, or lies between (``label_frames``, for the live one).
 What two views share is told by evidence (``evidence``), or guessed from poses (``overlap``).
+
+A new place is a frame without even a possible loop (``possible_overlap``): by the rule for pairs
+hardly any frame would be one, since within a room some earlier view always shares a little. The
+same bound tells a wrong match, and that a camera has looked elsewhere in between.
 """
 
 from __future__ import annotations
