@@ -41,7 +41,7 @@ from adversarial_lcd_ros.training.model_folder import trained_on
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
-# Seconds on one core (docs/evaluation.md): of a frame and of a walk; classes say the rest of them.
+# Seconds on one core (docs/results_folder.md), of a frame and of a walk; classes say the rest.
 # They only tell how long a sweep may take.
 _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
 
