@@ -161,7 +161,7 @@ def test_the_page_says_how_much_each_took():
     imports = [line for line in blocks[0].splitlines() if line]
     took = {}
     for block in blocks[1:]:
-        used = [line for line in imports if re.search(rf'\b{line.split()[-1]}\b', block)]
+        used = [line for line in imports if re.search(rf'\b{line.split()[-1]}\b(?!=)', block)]
         took[re.search(r'class (\w+)', block)[1]] = len(
             used + [line for line in block.splitlines() if line])
     table = re.findall(r'^\| (\w+), a \w+ \| (\d+) \| 1 \| 0 \|$', PAGE, re.M)
