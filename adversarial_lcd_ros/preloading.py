@@ -3,6 +3,8 @@ Compiled code, loaded before the first message.
 
 Else the first graph with something to compare with would wait for it, a second or more: an
 attacker's deadline would pass over one query, and a frame at 30 Hz over thirty.
+
+numba is a dependency, not an option: results must not hang on whether it is there.
 """
 
 from __future__ import annotations

@@ -5,6 +5,9 @@ PicoDet-S (COCO, Apache-2.0) travels in the wheel of paddlelabel-ml. Its convert
 is a compiled module for a few Python versions only: it is unpacked beside the model, run in a
 process of its own, and thrown away. Neither is ever installed, and what an index offers under
 their names is neither unpacked nor run before its digest was compared.
+
+The model is exported at opset 14, the first in which HardSwish is one operation: 13 spells it out
+in five and takes 1.7 times as long; boxes agree within 1.4e-4 pixels.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Settings on the command line and in YAML files, made from config.py.
 One file serves nodes and commands: what ``config/params.yaml`` gives a node as parameters, the
 commands read as settings (``--config``). The command line wins over the file, the file over the
 defaults.
+
+An unknown name is an error.
 """
 
 from __future__ import annotations

@@ -155,6 +155,19 @@ def test_what_ships_is_what_its_table_says(table):
     assert [table.find(name).name for name in table] == list(table)
 
 
+def test_the_page_says_how_much_each_took():
+    """Lines of the class and of the imports that it uses; all of it is one file."""
+    blocks = re.findall(r'```python\n(.*?)```', PAGE, re.S)
+    imports = [line for line in blocks[0].splitlines() if line]
+    took = {}
+    for block in blocks[1:]:
+        used = [line for line in imports if re.search(rf'\b{line.split()[-1]}\b(?!=)', block)]
+        took[re.search(r'class (\w+)', block)[1]] = len(
+            used + [line for line in block.splitlines() if line])
+    table = re.findall(r'^\| (\w+), a \w+ \| (\d+) \| 1 \| 0 \|$', PAGE, re.M)
+    assert {name: int(lines) for name, lines in table} == took
+
+
 def test_commands_of_the_page_name_its_classes_and_known_options():
     named = set(re.findall(r'lab\.mine:(\w+)', PAGE))
     assert named == {'Degree', 'Mean', 'Climb', 'Classes', 'DropsLongEdges'}

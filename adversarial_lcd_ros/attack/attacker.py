@@ -1,4 +1,11 @@
-"""The man in the middle: clean graph in, perturbed graph out (paper, attack-module)."""
+"""
+The man in the middle: clean graph in, perturbed graph out (paper, attack-module).
+
+y of the objective (Eq. 1) is the detector's own answer to the clean graph: a man in the middle has
+no ground truth. Frames that an attack so repairs are counted (regained, withdrawn) and lower the
+decline. The generator of a frame is seeded with (seed, sequence number), so that its result does
+not hang on how many random numbers others used. A deadline ends repeatability: time is no input.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""What an attacker remembers of the graphs that went by."""
+"""
+What an attacker remembers of the graphs that went by.
+
+Graphs are remembered as forwarded, since that is the detector's map; its temporal gap is learnt
+from soft answers of 0.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The black box, with what an attack may spend on it."""
+"""
+The black box, with what an attack may spend on it.
+
+It counts and refuses outside the search: a budget is enforced, not trusted. At the deadline no
+query is begun any more, and the best graph so far goes out: a late graph would show, a weak attack
+does not.
+"""
 
 from __future__ import annotations
 

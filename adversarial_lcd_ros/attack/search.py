@@ -1,4 +1,9 @@
-"""What a search for flips works on, and what it comes back with."""
+"""
+What a search for flips works on, and what it comes back with.
+
+The paper's search and our own are of one kind and share budgets, oracle, deadline and report, so
+that their figures compare.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Queried flips that train a surrogate for later frames, kept as npz."""
+"""
+Queried flips that train a surrogate for later frames, kept as npz.
+
+No pickled surrogate: the recorded rows (flips, gains) are kept, and the surrogate is fitted to
+them when the attacker starts. Rows can be read and checked, do not hang on a release of
+scikit-learn, and cannot run code.
+"""
 
 from __future__ import annotations
 

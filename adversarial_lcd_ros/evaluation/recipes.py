@@ -1,4 +1,8 @@
-"""Recipes: what an evaluation does, in small YAML files; each kind reads on in its own room."""
+"""
+Recipes: what an evaluation does, in small YAML files; each kind reads on in its own room.
+
+An option on the command line wins over each attack of a recipe.
+"""
 
 from __future__ import annotations
 

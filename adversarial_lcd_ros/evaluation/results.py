@@ -1,4 +1,9 @@
-"""The folder of one evaluation: results/<UTC time>/, and ``latest`` beside it."""
+"""
+The folder of one evaluation: results/<UTC time>/, and ``latest`` beside it.
+
+Complete or not there: written under another name, then renamed. summary.json has a ``kind``, the
+``schema`` of its rows, and the rows; folders of another schema are refused, not guessed at.
+"""
 
 from __future__ import annotations
 

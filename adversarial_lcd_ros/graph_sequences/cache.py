@@ -1,4 +1,9 @@
-"""Graphs on disk, under a digest of everything that they were made of."""
+"""
+Graphs on disk, under a digest of everything that they were made of.
+
+Pictures, settings, vocabulary, object model, code and the releases of libraries. A damaged file is
+built anew, and that is said.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,22 @@
-"""Evidence from pictures and true poses alone: what can be shown to be shared, and what cannot."""
+"""
+Evidence from pictures and true poses alone: what can be shown to be shared, and what cannot.
+
+Depth comes from motion: 600 ORB features a picture are matched with frames up to four seconds
+apart and some centimetres aside. Matches within 3 pixels of the true epipolar line give a depth; a
+feature without one lies as deep as those around it or, after a turn in place, anywhere from 0.3 m
+on.
+
+Every feature of a view is put into every older view at its depth, and the other way round: hidden
+behind what is nearer there, or somewhere on a short piece of its epipolar line. One there that
+looks alike (64 of 256 bits) is found. By chance as many are found as at the three mirror images of
+that place: another relative pose.
+
+Right: at least 12 found, and so many by chance less often than once in 10,000 times (Poisson).
+Elsewhere: no more found than by chance (1 %), nor in the frames 0.2 s before and after; less than
+a tenth of either view would be in sight from so much nearer, further or aside that ORB could not
+know it again; and features cover 45 % of the newer view: blank walls cannot be known again. A loop
+is right and near: within 0.5 m, 25 degrees, and 60 % of possible overlap.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,10 @@ something between (``relation``, for the pair protocol). A *frame* of a replay h
 found among its earlier frames, has none, or lies between (``label_frames``, for the live one).
 What two views share is told by evidence (``evidence``), or guessed from poses (``overlap``);
 ``judgement`` has both.
+
+A new place is a frame without even a possible loop (``possible_overlap``): by the rule for pairs
+hardly any frame would be one, since within a room some earlier view always shares a little. The
+same bound tells a wrong match, and that a camera has looked elsewhere in between.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""Scores of a target -> calibrated probability, by logistic regression kept as JSON."""
+"""
+Scores of a target -> calibrated probability, by logistic regression kept as JSON.
+
+On square roots of the scores: these are shares with a long tail, and their roots are nearer to
+what a logistic decision expects.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,9 @@ Log odds of a loop closure after every single flip of a graph, at once.
 
 No attack on a black box has this: it looks into the detector. It is the yardstick for those that
 ask (evaluation/frames/optimum.py).
+
+Cosines come from products of x0; deletions are recomputed, since differences of sums lose digits
+(flip_kernels.py).
 """
 
 from __future__ import annotations

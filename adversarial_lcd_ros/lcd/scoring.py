@@ -4,6 +4,9 @@ The one place where a graph is prepared and scored.
 The detector, the yardstick that scores all single flips (flips.py), training and the pairs that
 targets are measured on (training/pair_scores.py) all judge through it. So what is set for one
 of them holds for the others: a defence or a check cannot be in the one and not in the other.
+
+Behind a defence that makes other edges of a graph, single flips are judged one by one: slower,
+never otherwise.
 """
 
 from __future__ import annotations

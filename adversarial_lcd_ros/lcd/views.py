@@ -1,4 +1,10 @@
-"""What a target derives from a graph before it compares, and what edge flips leave alone."""
+"""
+What a target derives from a graph before it compares, and what edge flips leave alone.
+
+Matches come from descriptors, not from Weisfeiler-Lehman features: else each flip would move all
+of them, and nothing could be kept. A query is in double precision, references, of which 256 are
+kept, in single.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@ What messages must satisfy beside their types: ranges, sums, sizes, and what mus
 
 All that a schema says in words is checked here, so that nothing behind the codec meets a
 number it was not made for. Every refusal names its cause.
+
+Graphs that our own code made are not checked again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""The node attacker: a man in the middle on the topic that carries the graphs."""
+"""
+The node attacker: a man in the middle on the topic that carries the graphs.
+
+It never drops a graph: what cannot be attacked, or not even decoded, goes on as it came. Edits can
+be read off the two graph topics, queries cannot: hence reports, which the detector never sees.
+"""
 
 from __future__ import annotations
 

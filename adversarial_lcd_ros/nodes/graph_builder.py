@@ -1,4 +1,11 @@
-"""The node graph_builder: camera frames in, multi-tier graphs out."""
+"""
+The node graph_builder: camera frames in, multi-tier graphs out.
+
+Two frames are under way at once, each with one thread of the network: two threads on one frame
+take 36 ms of processor time for its objects, one takes 26. Graphs leave in the order of their
+frames. A frame whose detections do not come goes out without objects, counted: a dropped one would
+stop lockstep.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""The node lcd: graphs in, loop closures out; answers queries and forgets them."""
+"""
+The node lcd: graphs in, loop closures out; answers queries and forgets them.
+
+Graphs are taken from the subscription before each query, in one thread: the detector needs no
+lock, and a decision waits for one query at most.
+"""
 
 from __future__ import annotations
 

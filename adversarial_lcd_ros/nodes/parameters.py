@@ -1,4 +1,10 @@
-"""ROS parameters made from the settings of config.py: same names, defaults, ranges and texts."""
+"""
+ROS parameters made from the settings of config.py: same names, defaults, ranges and texts.
+
+Keys of a parameter file are ``/**/<node>``: one without the wildcard is missed by a node in a
+namespace, and ``/**`` would give each node the parameters of the others, which it refuses as
+unknown.
+"""
 
 from __future__ import annotations
 

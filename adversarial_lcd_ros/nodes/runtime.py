@@ -1,4 +1,11 @@
-"""Start, life and end of a node process; what all nodes have in common."""
+"""
+Start, life and end of a node process; what all nodes have in common.
+
+A callback decodes, calls the core once, encodes and publishes: so the same comes out over the wire
+and offline, and a test holds decisions, forwarded graphs and reports equal. rclpy's executor of
+events is used where a node has no guard condition: listing what to wait for took a third of the
+time of lockstep.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""A thread of its own for work that somebody waits for, but not for ever."""
+"""
+A thread of its own for work that somebody waits for, but not for ever.
+
+Python cannot stop a thread. So the search has one of its own: the best graph so far is taken at
+the deadline, and what the search brings later is thrown away.
+"""
 
 from __future__ import annotations
 

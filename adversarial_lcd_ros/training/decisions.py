@@ -1,4 +1,8 @@
-"""Train the decision of a target on sequences with ground truth."""
+"""
+Train the decision of a target on sequences with ground truth.
+
+Sequences and classes weigh the same, whatever their numbers of pairs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Fit the decision of a target on labelled pairs of graphs."""
+"""
+Fit the decision of a target on labelled pairs of graphs.
+
+Hard negatives come from retrieval: random pairs of different places are easy, those that words
+confuse are what a detector decides on.
+"""
 
 from __future__ import annotations
 

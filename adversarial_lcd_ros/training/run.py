@@ -1,4 +1,10 @@
-"""From sequences with ground truth to a folder of artefacts: ``adversarial-lcd train``."""
+"""
+From sequences with ground truth to a folder of artefacts: ``adversarial-lcd train``.
+
+Vocabulary, decisions and surrogate data belong together: ``--models FOLDER`` swaps all of them at
+once. Labels are wider than those of the evaluation (``TRAINING_LABELS``): a decision should also
+see glancing revisits, and short sequences have few late ones.
+"""
 
 from __future__ import annotations
 

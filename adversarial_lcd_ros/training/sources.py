@@ -1,4 +1,9 @@
-"""The sequences that a training may see, or the parts of them."""
+"""
+The sequences that a training may see, or the parts of them.
+
+Fractions of a sequence are blocks in time (``PATH@0:0.5``), never random frames: neighbouring
+frames are near copies.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Our own search: replay, or erase, what earlier graphs have in common with this one."""
+"""
+Our own search: replay, or erase, what earlier graphs have in common with this one.
+
+Without queries it only invents: few loops can be suppressed within the budget.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,12 @@
-"""The paper's search: flip after flip, the best of a few queried ones (Sec. 3.3 to 3.5)."""
+"""
+The paper's search: flip after flip, the best of a few queried ones (Sec. 3.3 to 3.5).
+
+The paper says only to query until success. A flip that lowers the loss is never committed here:
+the best of a bad lot walks downhill and spends edits on it. One without effect is committed: with
+hard answers nothing shows an effect before the decision turns. Features of a surrogate are
+differences to the unflipped graph, on constants instead of batch statistics: phi(G') itself mostly
+tells the frame, and rows computed at different times have to stay comparable.
+"""
 
 from __future__ import annotations
 

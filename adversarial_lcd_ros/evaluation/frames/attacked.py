@@ -6,6 +6,8 @@ each go by, but only a sample of the frames is attacked and judged, each against
 graphs before it. In a live run (``live``, ``offline``) every frame is attacked and the map
 consists of attacked graphs; here frames do not hang on each other, and attacks with a thousand
 queries a frame can be compared over many seeds.
+
+The sample hangs on seed and sequence only: all attacks meet the same frames.
 """
 
 from __future__ import annotations

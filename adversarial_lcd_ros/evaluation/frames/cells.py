@@ -3,6 +3,9 @@ Cells of an evaluation by frames: one attack with its settings, on one sequence,
 
 A cell has a key, a digest of all that its figures depend on, and becomes one row of cells.jsonl
 (``rows``).
+
+The key is made of content (graphs, labels, models, settings, code), never of a path. The threshold
+is a setting of a cell, like the size of the graph: declines hang on it more than on most attacks.
 """
 
 from __future__ import annotations

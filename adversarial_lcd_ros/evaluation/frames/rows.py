@@ -34,7 +34,7 @@ _FRAME_COLUMNS: Mapping[str, tuple[type, ...]] = {
 def make_row(cell: Cell, seed: int, sequence: str,
              results: Sequence[FrameResult]) -> dict[str, Any]:
     """
-    Return the row of a finished cell, ready for JSON (docs/evaluation.md lists its columns).
+    Return the row of a finished cell, ready for JSON (docs/results_folder.md lists its columns).
 
     Parameters
     ----------

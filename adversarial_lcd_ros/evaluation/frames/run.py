@@ -3,6 +3,9 @@ Experiments: the cells of a recipe on several sequences with many seeds, side by
 
 A task is some cells of one sequence and seed, walked together (``frames``). Tasks know nothing of
 each other; finished rows go to cells.jsonl at once, and what is there is not run again.
+
+Tasks take about 15 s each and go seed by seed: broken off, a sweep is a whole table with fewer
+seeds.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ from adversarial_lcd_ros.training.model_folder import trained_on
 FIRST_SEED = 42
 # A task returns all its rows at its end: short enough to lose, long enough to share a walk.
 _TASK_S = 15.0
-# Seconds on one core (docs/evaluation.md): of a frame and of a walk; classes say the rest of them.
+# Seconds on one core (docs/results_folder.md), of a frame and of a walk; classes say the rest.
 # They only tell how long an experiment may take.
 _FRAME_S, _WALK_S, _NODES = 0.03, 0.5, 300
 

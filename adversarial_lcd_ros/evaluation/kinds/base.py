@@ -1,4 +1,9 @@
-"""What every kind of results folder can do."""
+"""
+What every kind of results folder can do.
+
+What differs between kinds stands in one class each: ``report``, ``inspect`` and ``compare`` know
+none by name.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,13 @@
-"""Evaluation of one sequence over ROS 2: the same bag replayed clean and attacked."""
+"""
+Evaluation of one sequence over ROS 2: the same bag replayed clean and attacked.
+
+Under attack the map consists of attacked graphs: the detector stores what it was sent. The clean
+run and the first attack start from the images, which shows whether the graphs come out the same;
+further attacks replay the clean graphs of the first. Frames, graphs, decisions and reports are
+equal in number, or the run fails: a figure over fewer frames is another figure. Replays are in
+lockstep with a window of four frames: builder, attacker and detector work side by side, and
+nothing is lost.
+"""
 
 from __future__ import annotations
 
