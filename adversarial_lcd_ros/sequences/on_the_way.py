@@ -137,4 +137,4 @@ def _files(source: Path) -> list[Path]:
 
 
 def _code() -> list[Path]:
-    return [path for folder in sequences.__path__ for path in sorted(Path(folder).glob('*.py'))]
+    return [path for folder in sequences.__path__ for path in sorted(Path(folder).rglob('*.py'))]
