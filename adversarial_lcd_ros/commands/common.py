@@ -151,7 +151,12 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
                   MofNCompleteColumn(), TimeRemainingColumn(),
                   console=make_console(stderr=True)) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        try:
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+        except BaseException:
+            # What went wrong is said in one line: no half-done bar stays before it.
+            bar.live.transient = True
+            raise
 
 
 def tell(text: str) -> None:
