@@ -98,7 +98,7 @@ def test_covisibility_beside_a_sequence_wins_over_its_poses(tmp_path):
     poses = standing(20)
     graphs = [MultiTierGraph(int(stamp), 'camera', number, *SIZE)
               for number, stamp in enumerate(poses.stamp_ns)]
-    config = LabelConfig(min_gap_s=2.0)
+    config = LabelConfig(rule='auto', min_gap_s=2.0)
     write(tmp_path / 'covisibility.npz', np.zeros((20, 20)))
     assert find_covisibility(tmp_path) == tmp_path / 'covisibility.npz'
     assert find_covisibility(tmp_path / 'walk.bag') == tmp_path / 'covisibility.npz'

@@ -61,6 +61,43 @@ def test_other_content_or_options_are_another_import(tmp_path):
     assert [found[k].position[0, 0] for k in (0, 2, 3)] == [0.0, 1.0, 9.0]
 
 
+@pytest.mark.parametrize('name', ['covisibility.npz', 'depth.npz'])
+@pytest.mark.parametrize('write', [make.tum_folder, lambda path: make.write_ros2(
+    path, make.raw_rows()), lambda path: next(make.write_ros2(path, make.raw_rows()).glob(
+        '*.mcap'))])
+def test_what_tells_labels_what_views_share_goes_with_them(tmp_path, write, name):
+    source = write(tmp_path / 'walk')
+    before = imported(source, {})
+    beside = (source if source.is_dir() else source.parent) / name
+    beside.write_bytes(b'one')
+    carried = imported(source, {})
+    assert not (before / name).exists()
+    assert (carried / name).read_bytes() == b'one'
+    assert (import_sequence(source, tmp_path / 'bag').path / name).read_bytes() == b'one'
+    beside.write_bytes(b'two')
+    assert (imported(source, {}) / name).read_bytes() == b'two'
+    beside.unlink()
+    beside.symlink_to('/etc/passwd')
+    with pytest.raises(SequenceError, match=rf'{name} is a link out of its folder'):
+        import_sequence(source, tmp_path / 'bag', overwrite=True)
+
+
+def test_wrong_settings_are_told_before_an_import(tmp_path, cache, capsys):
+    pytest.importorskip('rclpy')
+    (tmp_path / 'settings.yaml').write_text('lcd: {threshold: "0.5"}')
+    assert main(['evaluate', str(make.tum_folder(tmp_path / 'tum')), '--config',
+                 str(tmp_path / 'settings.yaml'), '--output', str(tmp_path / 'results')]) == 2
+    assert capsys.readouterr().err.count('\n') == 1
+    assert not cache.exists()
+
+
+def test_what_cannot_be_imported_is_said_in_one_line(tmp_path, capsys):
+    (tmp_path / 'empty').mkdir()
+    assert main(['import', str(tmp_path / 'empty'), str(tmp_path / 'bag')]) == 2
+    line, = capsys.readouterr().err.splitlines()
+    assert line.startswith(f'error: {tmp_path / "empty"} holds no sequence')
+
+
 @pytest.mark.parametrize('rows', [
     make.raw_rows(), make.jpeg_rows(topic='/camera/image_raw/compressed'),
     make.jpeg_rows() + [('/odom', make.ODOMETRY, make.START_NS, make.ROS2.odometry(

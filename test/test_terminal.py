@@ -98,4 +98,4 @@ def test_an_error_with_any_name_is_one_line(terminal, tmp_path):
     text = opened.text()
     assert text.startswith('error: ')
     assert text.count('\n') == 1
-    assert 'n?[/b]?' in text
+    assert r'n?[/b]\udcff' in text

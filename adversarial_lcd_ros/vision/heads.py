@@ -42,6 +42,8 @@ def wrong_classes(label: NDArray[np.float32]) -> str:
 
 def wrong_corners(corners: NDArray[np.float32]) -> str:
     """Return what is wrong with x1, y1, x2, y2 of sure boxes, float32 (k, 4); '' if nothing is."""
+    if wrong := not_finite(corners):
+        return wrong
     turned = corners[~(corners[:, :2] <= corners[:, 2:]).all(axis=1)]
     if len(turned):
         return (f'the box {turned[0].tolist()} whose second corner is not right of and below its '
