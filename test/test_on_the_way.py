@@ -5,6 +5,7 @@ import shutil
 
 import bag_factory as make
 import cv2
+import layout_factory as layouts
 import pytest
 
 from adversarial_lcd_ros.cli import main
@@ -178,7 +179,7 @@ def robot_bag(path, count):
         place = (0.05 * k, 0.0, 0.0)
         rows += [
             ('/camera/image_raw', make.IMAGE, stamp, make.ROS2.image(
-                stamp, cv2.cvtColor(make.noise(k), cv2.COLOR_GRAY2BGR),
+                stamp, cv2.cvtColor(make.noise(k), cv2.COLOR_GRAY2BGRA), 'bgra8',
                 frame_id='camera_optical')),
             ('/camera/camera_info', make.CAMERA_INFO, stamp,
              make.ROS2.camera_info(stamp, 'camera_optical')),
@@ -204,3 +205,21 @@ def test_a_robots_bag_goes_from_file_to_report_by_one_command(tmp_path, capsys):
     assert (latest / 'report.html').stat().st_size
     assert main([*line, '--ground-truth', 'none']) == 0
     assert not json.loads((latest / 'summary.json').read_text())['labelled']
+
+
+@pytest.mark.parametrize('write', [
+    lambda path: layouts.video(path / 'walk.mp4', count=8),
+    lambda path: make.write_ros2(path / 'walk', make.raw_rows(8))])
+def test_what_has_no_ground_truth_goes_from_file_to_report_by_one_command(
+        tmp_path, capsys, write):
+    pytest.importorskip('rclpy')
+    recipe = tmp_path / 'one.yaml'
+    recipe.write_text('attacks: [{name: recall, search: recall, max_queries: 2}]')
+    assert main(['evaluate', str(write(tmp_path)), '--output', str(tmp_path / 'results'),
+                 '--builder-detector', 'none', '--recipe', str(recipe)]) == 0
+    said = capsys.readouterr()
+    assert 'no ground truth' in said.err
+    latest = tmp_path / 'results' / 'latest'
+    summary = json.loads((latest / 'summary.json').read_text())
+    assert (summary['sequence'], summary['frames'], summary['labelled']) == ('walk', 8, False)
+    assert 'no ground truth' in (latest / 'report.html').read_text()

@@ -36,7 +36,7 @@ class Audit:
 
 
 def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
-              located: NDArray[np.bool_], first: bytes, focal_length: float) -> str:
+              located: NDArray[np.bool_], first: bytes, focal: Focal) -> str:
     """
     Return a digest of all that an audit is made of, hexadecimal.
 
@@ -45,7 +45,7 @@ def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
     """
     digest = hashlib.blake2b(digest_size=16)
     arrays = (rows.stamp_ns, rows.position, rows.quaternion, candidates, located)
-    versions = f'{source.resolve()} {focal_length} {np.__version__} {cv2.__version__}'.encode()
+    versions = f'{source.resolve()} {focal} {np.__version__} {cv2.__version__}'.encode()
     for part in (versions, first, *(array.tobytes() for array in arrays),
                  *(path.read_bytes() for path in _CODE)):
         # With its length, so that no two lists of parts run into the same bytes.
