@@ -219,6 +219,13 @@ def test_messages_of_version_1_are_read():
     assert old.log_odds == pytest.approx(np.log(3))
 
 
+def test_a_message_of_the_newest_version_is_never_called_unknown():
+    message = replace(as_version_1(codec._graph_message(make_graph())), schema_version=2)
+    payload = typestore(1).serialize_cdr(message, 'adversarial_lcd_ros/msg/MultiTierGraph')
+    with pytest.raises(CodecError, match='are no MultiTierGraph'):
+        codec.decode_graph(payload)
+
+
 def test_log_odds_tell_more_than_the_probability():
     answer = codec.LcdAnswer(3, True, True, 1.0, log_odds=40.0)
     assert codec.decode_answer(codec.encode_answer(answer)).log_odds == 40.0

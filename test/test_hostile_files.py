@@ -224,7 +224,7 @@ def huge_model(path):
 
 @pytest.mark.parametrize(('row', 'message'), [
     ([1, 2, 30, np.nan, 0.9, 5], 'a box of NaN'), ([1, 2, np.inf, 40, 0.9, 5], 'a box of NaN'),
-    ([1, 2, 30, 40, 1e30, 5], 'scores from'), ([1, 2, 30, 40, 0.9, -1], 'class -1'),
+    ([1, 2, 30, 40, 1e30, 5], 'scores from 1e+30'), ([1, 2, 30, 40, 0.9, -1], 'class -1'),
     ([1, 2, 30, 40, 0.9, 1e20], 'class 1e'), ([1, 2, 30, 40, 0.9, np.nan], 'class nan')])
 def test_network_that_gives_nonsense(tmp_path, refused, row, message):
     model = constant_model(tmp_path / 'model.onnx', [[row] * 7])
@@ -234,7 +234,7 @@ def test_network_that_gives_nonsense(tmp_path, refused, row, message):
 
 
 def test_network_that_gives_nonsense_of_no_confidence_works(tmp_path):
-    model = constant_model(tmp_path / 'model.onnx', [[[np.nan, np.inf, -1, 2, 0.1, -5]] * 7])
+    model = constant_model(tmp_path / 'model.onnx', [[[np.nan, np.inf, -1, 2, 0.1, 5]] * 7])
     assert not len(ObjectDetector(model, 0.4).detect(np.zeros((48, 64, 3), np.uint8)))
 
 
@@ -274,6 +274,8 @@ def test_link_out_of_the_source_is_not_followed_into_the_bag(tmp_path, pictures,
     (pictures / 'LICENSE').symlink_to('/etc/passwd')
     line = refused('import', pictures, tmp_path / 'bag')
     assert 'LICENSE is a link out of its folder' in line
+    assert not (tmp_path / 'bag').exists()
+    assert refused('build', pictures, tmp_path / 'bag', '--detector', 'none') == line
     assert not (tmp_path / 'bag').exists()
     (pictures / 'LICENSE').unlink()
     (pictures / 'TERMS').write_text('free')

@@ -2,11 +2,14 @@
 
 import json
 
+import bag_factory as make
 import cv2
+import layout_factory as layouts
 import numpy as np
 import pytest
 
 from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.sequences import import_sequence, open_sequence
 
 
 @pytest.fixture
@@ -65,3 +68,17 @@ def test_without_exact_shares_there_is_nothing_to_check(sequence, tmp_path, caps
     assert main(['labels', str(sequence), '--check', '--label-rule', 'overlap',
                  '--output', str(tmp_path / 'out')]) == 2
     assert 'no covisibility.npz' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('write', [layouts.kitti, layouts.euroc])
+def test_the_focal_length_of_the_calibration_is_taken_where_there_is_one(
+        tmp_path, monkeypatch, write):
+    monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path / 'cache'))
+    recording = write(tmp_path / 'recording')
+    bag = import_sequence(recording, tmp_path / 'bag').path
+    for source in (recording, bag):
+        out = tmp_path / 'out' / source.name
+        assert main(['labels', str(source), '--label-rule', 'audit', '--output', str(out)]) == 0
+        row, = json.loads((out / 'summary.json').read_text())['rows']
+        assert row['focal_from'] == 'calibration in the recording'
+        assert row['focal_length'] == open_sequence(recording).focal_length_px / make.WIDTH

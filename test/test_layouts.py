@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import import_sequence, open_sequence
+from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 
 POSES = layouts.poses()
 
@@ -53,6 +54,24 @@ def test_euroc_without_a_mount_is_refused(tmp_path):
         open_sequence(folder)
     sequence = open_sequence(folder, ground_truth='none')
     assert (sequence.trajectory, sequence.focal_length_px) == (None, None)
+
+
+@pytest.mark.parametrize('spoiled', [True, False])
+def test_extrinsics_take_the_place_of_the_recordings_own_mount(tmp_path, spoiled):
+    mount = np.eye(4)
+    mount[:3, 3] = 0.5, -0.25, 1.0
+    euroc, kitti = layouts.euroc(tmp_path / 'MH_01'), layouts.kitti(tmp_path)
+    openloris, _ = layouts.openloris(tmp_path / 'cafe1-1')
+    if spoiled:
+        (euroc / 'mav0/cam0/sensor.yaml').unlink()
+        (kitti / 'calib.txt').unlink()
+        (openloris / 'trans_matrix.yaml').unlink()
+    for folder, camera in ((euroc, 'cam0'), (kitti, 'image_1'), (openloris, 'color')):
+        if spoiled:
+            with pytest.raises(SequenceError, match='--extrinsics'):
+                open_sequence(folder, camera=camera)
+        sequence = open_sequence(folder, camera=camera, truth=TruthOptions(extrinsics=mount))
+        assert_poses(sequence.trajectory, POSES @ mount)
 
 
 def test_kitti(tmp_path):

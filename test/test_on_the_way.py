@@ -5,6 +5,7 @@ import shutil
 
 import bag_factory as make
 import cv2
+import layout_factory as layouts
 import pytest
 
 from adversarial_lcd_ros.cli import main
@@ -59,6 +60,43 @@ def test_other_content_or_options_are_another_import(tmp_path):
     found = [open_sequence(bag).trajectory for bag in bags]
     assert found[1] is None
     assert [found[k].position[0, 0] for k in (0, 2, 3)] == [0.0, 1.0, 9.0]
+
+
+@pytest.mark.parametrize('name', ['covisibility.npz', 'depth.npz'])
+@pytest.mark.parametrize('write', [make.tum_folder, lambda path: make.write_ros2(
+    path, make.raw_rows()), lambda path: next(make.write_ros2(path, make.raw_rows()).glob(
+        '*.mcap'))])
+def test_what_tells_labels_what_views_share_goes_with_them(tmp_path, write, name):
+    source = write(tmp_path / 'walk')
+    before = imported(source, {})
+    beside = (source if source.is_dir() else source.parent) / name
+    beside.write_bytes(b'one')
+    carried = imported(source, {})
+    assert not (before / name).exists()
+    assert (carried / name).read_bytes() == b'one'
+    assert (import_sequence(source, tmp_path / 'bag').path / name).read_bytes() == b'one'
+    beside.write_bytes(b'two')
+    assert (imported(source, {}) / name).read_bytes() == b'two'
+    beside.unlink()
+    beside.symlink_to('/etc/passwd')
+    with pytest.raises(SequenceError, match=rf'{name} is a link out of its folder'):
+        import_sequence(source, tmp_path / 'bag', overwrite=True)
+
+
+def test_wrong_settings_are_told_before_an_import(tmp_path, cache, capsys):
+    pytest.importorskip('rclpy')
+    (tmp_path / 'settings.yaml').write_text('lcd: {threshold: "0.5"}')
+    assert main(['evaluate', str(make.tum_folder(tmp_path / 'tum')), '--config',
+                 str(tmp_path / 'settings.yaml'), '--output', str(tmp_path / 'results')]) == 2
+    assert capsys.readouterr().err.count('\n') == 1
+    assert not cache.exists()
+
+
+def test_what_cannot_be_imported_is_said_in_one_line(tmp_path, capsys):
+    (tmp_path / 'empty').mkdir()
+    assert main(['import', str(tmp_path / 'empty'), str(tmp_path / 'bag')]) == 2
+    line, = capsys.readouterr().err.splitlines()
+    assert line.startswith(f'error: {tmp_path / "empty"} holds no sequence')
 
 
 @pytest.mark.parametrize('rows', [
@@ -141,7 +179,7 @@ def robot_bag(path, count):
         place = (0.05 * k, 0.0, 0.0)
         rows += [
             ('/camera/image_raw', make.IMAGE, stamp, make.ROS2.image(
-                stamp, cv2.cvtColor(make.noise(k), cv2.COLOR_GRAY2BGR),
+                stamp, cv2.cvtColor(make.noise(k), cv2.COLOR_GRAY2BGRA), 'bgra8',
                 frame_id='camera_optical')),
             ('/camera/camera_info', make.CAMERA_INFO, stamp,
              make.ROS2.camera_info(stamp, 'camera_optical')),
@@ -167,3 +205,21 @@ def test_a_robots_bag_goes_from_file_to_report_by_one_command(tmp_path, capsys):
     assert (latest / 'report.html').stat().st_size
     assert main([*line, '--ground-truth', 'none']) == 0
     assert not json.loads((latest / 'summary.json').read_text())['labelled']
+
+
+@pytest.mark.parametrize('write', [
+    lambda path: layouts.video(path / 'walk.mp4', count=8),
+    lambda path: make.write_ros2(path / 'walk', make.raw_rows(8))])
+def test_what_has_no_ground_truth_goes_from_file_to_report_by_one_command(
+        tmp_path, capsys, write):
+    pytest.importorskip('rclpy')
+    recipe = tmp_path / 'one.yaml'
+    recipe.write_text('attacks: [{name: recall, search: recall, max_queries: 2}]')
+    assert main(['evaluate', str(write(tmp_path)), '--output', str(tmp_path / 'results'),
+                 '--builder-detector', 'none', '--recipe', str(recipe)]) == 0
+    said = capsys.readouterr()
+    assert 'no ground truth' in said.err
+    latest = tmp_path / 'results' / 'latest'
+    summary = json.loads((latest / 'summary.json').read_text())
+    assert (summary['sequence'], summary['frames'], summary['labelled']) == ('walk', 8, False)
+    assert 'no ground truth' in (latest / 'report.html').read_text()

@@ -147,11 +147,17 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
         TimeRemainingColumn,
     )
 
+    console = make_console(stderr=True)
     with Progress(TextColumn('{task.description}', markup=False), BarColumn(),
                   MofNCompleteColumn(), TimeRemainingColumn(),
-                  console=make_console(stderr=True)) as bar:
+                  console=console) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        try:
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+        except BaseException:
+            # What went wrong is said in one line: no half-done bar stays before it.
+            bar.live.transient, console.quiet = True, not console.is_terminal
+            raise
 
 
 def tell(text: str) -> None:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros.commands import evaluate_frames
 from adversarial_lcd_ros.commands.common import (
@@ -35,6 +35,9 @@ from adversarial_lcd_ros.settings import (
     config_from_options,
 )
 from adversarial_lcd_ros.start import ros_problem
+
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.replay.run import Plan
 
 RECIPE = 'quick'
 DEMO_BAG = 'bags/flat_tour'
@@ -120,7 +123,10 @@ def _evaluate(options: Namespace) -> None:
         raise ConfigError(f'recipe {options.recipe} replays one bag, found '
                           f'{len(options.sources)}: name one, or a recipe of the protocol '
                           f'"{FRAMES}" such as paper')
-    _evaluate_bag(Path(imported_source(options.sources[0], options, replayed=True)), options)
+    # Wrong settings are told before the minutes that an import may take.
+    plan = _plan(options)
+    _evaluate_bag(Path(imported_source(options.sources[0], options, replayed=True)), plan,
+                  options)
 
 
 def _report_recording(bag: Path, options: Namespace) -> None:
@@ -136,24 +142,29 @@ def _demo(options: Namespace) -> None:
     from adversarial_lcd_ros.paths import share_path
 
     options.recipe = options.recipe or RECIPE
-    _evaluate_bag(share_path(DEMO_BAG), options)
+    _evaluate_bag(share_path(DEMO_BAG), _plan(options), options)
 
 
-def _evaluate_bag(bag: Path, options: Namespace) -> None:
+def _plan(options: Namespace) -> Plan:
     problem = ros_problem()
     if problem:
         raise ConfigError(problem)
 
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
-    from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+    from adversarial_lcd_ros.evaluation.replay.run import Plan
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
-    plan = Plan(config_from_options(options, BuilderConfig),
+    return Plan(config_from_options(options, BuilderConfig),
                 config_from_options(options, LcdConfig),
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
                 attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
+
+
+def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
+
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
                                     keep_recordings=options.keep_recordings)
     _show(folder, summary, options)

@@ -15,8 +15,9 @@ from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, open_grap
 from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
+from adversarial_lcd_ros.sequences.companions import companions_of
 from adversarial_lcd_ros.sequences.importing import pose_messages
-from adversarial_lcd_ros.sequences.part import SequencePart, terms_of
+from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.sequences.replay import payload_schemas
 from adversarial_lcd_ros.sequences.sequence import Progress
 
@@ -43,7 +44,7 @@ def build_graph_bag(source: str, destination: Path, config: BuilderConfig, *,
 
     Graphs become std_msgs/UInt8MultiArray on /graph. The settings that they were built with,
     and the schemas of the payloads, go into the metadata; credits and licence files of a source
-    folder go with what was made of the pictures.
+    folder, and what tells labels what its views share, go with what was made of the pictures.
 
     Parameters
     ----------
@@ -62,14 +63,15 @@ def build_graph_bag(source: str, destination: Path, config: BuilderConfig, *,
     """
     # Before the minutes of work, to see whether the place is free.
     with BagWriter(destination, overwrite=overwrite) as bag:
+        path = SequencePart.parse(source).path
+        beside = companions_of(path) if path.exists() else []
         found = open_graphs(source, config, cache, progress)
         bag.note(PROVENANCE, json.dumps({
             'source': source, 'name': found.name, 'settings': asdict(config),
             'version': __version__}))
         poses = write_graphs(bag, found)
-        path = SequencePart.parse(source).path
-        for name in terms_of(path) if path.is_dir() else ():
-            bag.attach(path / name)
+        for file in beside:
+            bag.attach(file)
     return GraphBagSummary(destination, found, poses,
                            sum(file.stat().st_size for file in destination.iterdir()))
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _HERE = Path(__file__).resolve().parent
 _CODE = (*sorted(_HERE.glob('*.py')), _HERE.parent / 'compiled' / 'sightings.py',
+         _HERE.parent / 'compiled' / 'hamming.py',
          _HERE.parent / 'vision' / 'features.py')
 
 
@@ -35,7 +36,7 @@ class Audit:
 
 
 def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
-              located: NDArray[np.bool_], first: bytes, focal_length: float) -> str:
+              located: NDArray[np.bool_], first: bytes, focal: Focal) -> str:
     """
     Return a digest of all that an audit is made of, hexadecimal.
 
@@ -43,7 +44,7 @@ def cache_key(source: Path, rows: Trajectory, candidates: NDArray[np.int64],
     recorded, the code, and the libraries below it.
     """
     arrays = (rows.stamp_ns, rows.position, rows.quaternion, candidates, located)
-    versions = f'{source.resolve()} {focal_length} {np.__version__} {cv2.__version__}'.encode()
+    versions = f'{source.resolve()} {focal} {np.__version__} {cv2.__version__}'.encode()
     return digest_of_parts((versions, first, *(array.tobytes() for array in arrays),
                             *(path.read_bytes() for path in _CODE)))
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.errors import EvaluationError, FileError
+from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.sequences.companions import COVISIBILITY
 
-COVISIBILITY = 'covisibility.npz'
+# Percents of views that share nothing are 0 over and over: deflate reaches its most.
+_MAX_RATIO = 1100
 # Stamps are written as float64 seconds, which hold 0.2 microseconds of today's time.
 _SAME_STAMP_NS = 1_000_000
 
@@ -71,11 +73,10 @@ def read_covisibility(path: Path) -> Covisibility:
 
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            percent, seconds = arrays['percent'], arrays['timestamp']
-    except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
-        raise EvaluationError(f'{path} cannot be read: {error}; expected an npz with percent and '
-                              'timestamp') from error
+        arrays = read_npz(path, ('percent', 'timestamp'), ratio=_MAX_RATIO)
+    except FileError as error:
+        raise EvaluationError(f'{error}; expected percent and timestamp') from error
+    percent, seconds = arrays['percent'], arrays['timestamp']
     count = len(np.atleast_1d(seconds))
     if (percent.dtype != np.uint8 or percent.shape != (count, count)
             or seconds.dtype != np.float64 or percent.max(initial=0) > 100):

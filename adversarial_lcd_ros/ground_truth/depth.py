@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.compiled.shared_surface import shared_surface
-from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.errors import EvaluationError, FileError, SequenceError
+from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.sequences.companions import DEPTH_ARCHIVE
 from adversarial_lcd_ros.sequences.text_files import text_rows
 from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
 
-DEPTH_ARCHIVE, DEPTH_LIST = 'depth.npz', 'depth.txt'
+DEPTH_LIST = 'depth.txt'
+# Depth of a wall is one number over and over: deflate reaches its most.
+_MAX_RATIO = 1100
 # Rays over the frame; more cost time and tell no more.
 ROWS, COLUMNS = 48, 64
 TUM_UNITS_A_METRE = 5000.0
@@ -81,11 +84,10 @@ def read_archive(path: Path) -> DepthImages:
 
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            depth, seconds = arrays['depth_mm'], arrays['timestamp']
-    except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
-        raise EvaluationError(f'{path} cannot be read: {error}; expected an npz with depth_mm and '
-                              'timestamp') from error
+        arrays = read_npz(path, ('depth_mm', 'timestamp'), ratio=_MAX_RATIO)
+    except FileError as error:
+        raise EvaluationError(f'{error}; expected depth_mm and timestamp') from error
+    depth, seconds = arrays['depth_mm'], arrays['timestamp']
     if (depth.dtype != np.uint16 or depth.ndim != 3 or seconds.dtype != np.float64
             or seconds.shape != depth.shape[:1] or not len(seconds)):
         raise EvaluationError(f'{path} holds depth_mm {depth.dtype}{depth.shape} and timestamp '

@@ -140,8 +140,9 @@ def label_views(views: Views, config: LabelConfig, progress: Progress | None = N
 
 
 def _by_depth(views: Views, images: DepthImages, config: LabelConfig) -> tuple[Evidence, Focal]:
-    features, camera = _features(views), _camera(views, config)
-    focal = _focal(features, camera, config)
+    camera, focal = _camera(views, config), _known_focal(views)
+    if focal is None:
+        focal = _measured_focal(_features(views), camera, config)
     return from_shares(shares_of(images, views.stamp_ns, camera.turn, camera.centre,
                                  focal.share), config), focal
 
@@ -151,12 +152,13 @@ def _by_audit(views: Views, config: LabelConfig, progress: Progress | None
     stamps, size = views.stamp_ns, views.image_size
     rows, located = located_poses(views.trajectory, stamps, config)
     candidates = count_old_enough(stamps, config.min_gap_s)
+    known = _known_focal(views)
     key = audit_cache.cache_key(views.source, rows, candidates, located, _first_bytes(views),
-                                config.focal_length)
+                                known or Focal(config.focal_length, 'setting'))
     found = audit_cache.load(key)
     if found is None:
         features, camera = _features(views), _camera(views, config)
-        focal = _focal(features, camera, config)
+        focal = known or _measured_focal(features, camera, config)
         camera = replace(camera, focal=focal.share * size[0])
         found = audit_cache.Audit(audit.look(features, camera, candidates, progress), focal)
         audit_cache.save(key, found)
@@ -193,7 +195,14 @@ def _first_bytes(views: Views) -> bytes:
     return next(_frames_at(pictures, views.stamp_ns[:1])).data
 
 
-def _focal(features: ViewFeatures, camera: Camera, config: LabelConfig) -> Focal:
+def _known_focal(views: Views) -> Focal | None:
+    pictures = _pictures(views.source)
+    if pictures is None or pictures.focal_length_px is None:
+        return None
+    return Focal(pictures.focal_length_px / pictures.image_size[0], 'calibration in the recording')
+
+
+def _measured_focal(features: ViewFeatures, camera: Camera, config: LabelConfig) -> Focal:
     measured = measure_focal(features, camera)
     if measured is None:
         return Focal(config.focal_length, 'setting: matches do not tell it')

@@ -91,9 +91,14 @@ def load(payload: bytes | bytearray | memoryview, name: str, max_bytes: int) -> 
             continue
         if message.schema_version == version:
             return message
+        if 1 <= message.schema_version <= latest:
+            # A layout that only looks like this one: the newest says what is wrong.
+            reason = reason or CodecError(f'{name} of version {message.schema_version} has the '
+                                          f'fields of version {version}', cause='version')
+            continue
         reason = CodecError(
-            f'{name} has schema version {message.schema_version}: this package reads up to '
-            f'version {latest}', cause='version')
+            f'{name} has schema version {message.schema_version}: this package reads 1 to '
+            f'{latest}', cause='version')
         break
     if isinstance(reason, CodecError):
         raise reason

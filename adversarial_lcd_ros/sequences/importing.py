@@ -15,6 +15,7 @@ from adversarial_lcd_ros.messages.codec import typestore
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header
+from adversarial_lcd_ros.sequences.companions import companions_of
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
 from adversarial_lcd_ros.sequences.sequence import Coverage, Progress, Sequence
@@ -25,9 +26,6 @@ CAMERA_INFO_TOPIC = '/camera_info'
 CAMERA_FRAME = 'camera'
 # Poses from so long before the first frame to so long after the last one are kept.
 _MARGIN_NS = 100_000_000
-# Who made the pictures, and what one may do with them.
-_TERMS = ('credits', 'license', 'licence')
-_MAX_TERMS_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -58,8 +56,8 @@ def import_sequence(source: Path | str, destination: Path | str, *,
     their bytes untouched, raw images as JPEG of quality 95 or as PNG. Every frame is decoded
     once, as a check. Ground truth becomes geometry_msgs/PoseStamped on /ground_truth, a focal
     length that the recording tells one sensor_msgs/CameraInfo on /camera_info. Credits and
-    licence files of a source folder go with the pictures. With one release of rosbags, the
-    same source always gives the same bytes.
+    licence files of a source folder, and what tells labels what its views share, go with the
+    pictures. With one release of rosbags, the same source always gives the same bytes.
 
     Parameters
     ----------
@@ -83,7 +81,10 @@ def import_sequence(source: Path | str, destination: Path | str, *,
     """
     if raw_as not in (JPEG, PNG):
         raise SequenceError(f'raw images as {raw_as!r}: expected {JPEG!r} or {PNG!r}')
-    terms = _terms(Path(source))
+    source = Path(source)
+    if not source.exists():
+        raise SequenceError(f'there is no sequence {source}')
+    beside = companions_of(source)
     with BagWriter(Path(destination), overwrite=overwrite) as bag:
         sequence = open_sequence(source, topic=topic, ground_truth=ground_truth, rate_hz=rate_hz,
                                  camera=camera, truth=truth, stamps=stamps)
@@ -95,7 +96,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
                 camera_messages(sequence), poses, map(_image_message, frames),
                 key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
-        for file in terms:
+        for file in beside:
             bag.attach(file)
     return _summary(Path(destination), sequence, len(poses))
 
@@ -106,22 +107,6 @@ def _summary(path: Path, sequence: Sequence, poses: int) -> ImportSummary:
         path, sequence.name, sequence.frame_count, poses, sequence.image_size,
         float(stamps[-1] - stamps[0]) / 1e9, sum(file.stat().st_size for file in path.iterdir()),
         sequence.coverage, sequence.notes)
-
-
-def _terms(source: Path) -> list[Path]:
-    if not source.is_dir():
-        return []
-    found = [path for path in sorted(source.iterdir()) if path.stem.lower() in _TERMS
-             and not path.is_dir()]
-    for path in found:
-        # A recording from elsewhere must not put a file of this machine into the bag.
-        if not path.resolve().is_relative_to(source.resolve()):
-            raise SequenceError(f'{path} is a link out of its folder, to {path.resolve()}: it '
-                                'would go into the bag; put the text itself there, or remove it')
-        if not path.is_file() or path.stat().st_size > _MAX_TERMS_BYTES:
-            raise SequenceError(f'{path} is no file of at most {_MAX_TERMS_BYTES} bytes: expected '
-                                'the terms of use, or nothing of this name')
-    return found
 
 
 def _counted(frames: Iterator[Frame], total: int, raw_as: str,

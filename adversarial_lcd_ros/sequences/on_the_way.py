@@ -23,6 +23,7 @@ from adversarial_lcd_ros.sequences.bagfile import (
     BagFile,
     is_bag,
 )
+from adversarial_lcd_ros.sequences.companions import EVIDENCE
 from adversarial_lcd_ros.sequences.damage import METADATA
 from adversarial_lcd_ros.sequences.importing import (
     GROUND_TRUTH_TOPIC,
@@ -124,9 +125,9 @@ def _files(source: Path) -> list[Path]:
     if source.is_dir():
         return [path for path in sorted(source.rglob('*'))
                 if path.is_file() and not path.name.startswith('.')]
-    beside = source.parent / TRUTH_FILE
-    return [source, beside] if beside.is_file() else [source]
+    return [source, *(path for name in (TRUTH_FILE, *EVIDENCE)
+                      if (path := source.parent / name).is_file())]
 
 
 def _code() -> list[Path]:
-    return [path for folder in sequences.__path__ for path in sorted(Path(folder).glob('*.py'))]
+    return [path for folder in sequences.__path__ for path in sorted(Path(folder).rglob('*.py'))]

@@ -77,19 +77,21 @@ def open_sequence(path: Path | str, *, topic: str | None = None,
     options = truth or TruthOptions()
     _refuse(path, stamps=stamps, fixed_frame=options.fixed_frame, body_frame=options.body_frame,
             camera_frame=options.camera_frame)
-    return _with_extrinsics(_open(path, topic, ground_truth, rate_hz, camera), options)
+    found = _open(path, topic, Options(camera, ground_truth, rate_hz,
+                                       has_extrinsics=options.extrinsics is not None))
+    return _with_extrinsics(found, options)
 
 
-def _open(path: Path, topic: str | None, ground_truth: Path | str | None,
-          rate_hz: float | None, camera: str | None) -> Sequence:
+def _open(path: Path, topic: str | None, options: Options) -> Sequence:
     """Open a source that is no bag."""
+    camera, ground_truth, rate_hz = options.camera, options.ground_truth, options.rate_hz
     if path.is_dir() and (path / folders.TUM_IMAGES).is_file():
         _refuse(path, topic=topic, rate_hz=rate_hz, camera=camera)
         return _without_truth(folders.tum_folder(path, _file(ground_truth)), ground_truth)
     _refuse(path, topic=topic)
     if is_video(path):
         _refuse(path, camera=camera)
-        return video_sequence(path, Options(None, ground_truth, rate_hz))
+        return video_sequence(path, options)
     if not path.is_dir():
         raise SequenceError(_no_sequence(path))
     found = find_layout(path)
@@ -97,7 +99,7 @@ def _open(path: Path, topic: str | None, ground_truth: Path | str | None,
         layout, folder, named = found
         if layout.has_stamps:
             _refuse(path, rate_hz=rate_hz)
-        return layout.open(folder, Options(camera or named, ground_truth, rate_hz))
+        return layout.open(folder, replace(options, camera=camera or named))
     return _image_folder(path, ground_truth, rate_hz, camera)
 
 

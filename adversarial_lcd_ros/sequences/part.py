@@ -7,10 +7,9 @@ from pathlib import Path
 import re
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.sequences.companions import is_terms
 
 _PART = re.compile(r'(?P<path>.+)@(?P<start>[0-9]*\.?[0-9]+):(?P<stop>[0-9]*\.?[0-9]+)')
-# What the files are called that say what one may do with the pictures.
-_TERMS = ('credits', 'license', 'licence')
 
 
 @dataclass(frozen=True)
@@ -83,4 +82,4 @@ def terms_of(path: Path) -> tuple[str, ...]:
     """Return the names of the files with credits or a licence beside the frames, sorted."""
     folder = path if path.is_dir() else path.parent
     return tuple(sorted(file.name for file in folder.iterdir()
-                        if file.is_file() and file.stem.lower() in _TERMS))
+                        if file.is_file() and is_terms(file)))

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.frame_poses import read_poses
+from adversarial_lcd_ros.sequences.pose_files import mounted
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
@@ -29,21 +31,39 @@ class Options:
         A file of poses, 'none', or None: what the recording brings along.
     rate_hz : float or None
         Of recordings without stamps.
+    has_extrinsics : bool
+        The caller knows where the camera sits, and mounts the poses himself.
 
     """
 
     camera: str | None = None
     ground_truth: Path | str | None = None
     rate_hz: float | None = None
+    has_extrinsics: bool = False
 
-    def trajectory(self, stamps_ns: ArrayLike,
-                   own: Callable[[], Trajectory | None]) -> Trajectory | None:
-        """Return the ground truth of frames at some stamps; ``own`` reads the recording's."""
-        if self.ground_truth is None:
-            return own()
+    def trajectory(self, stamps_ns: ArrayLike, own: Callable[[], Trajectory | None],
+                   mount: Callable[[], NDArray[np.float64]] | None = None) -> Trajectory | None:
+        """
+        Return the ground truth of frames at some stamps.
+
+        Parameters
+        ----------
+        stamps_ns : int64, (n,)
+        own : callable
+            Reads the poses of the recording.
+        mount : callable, optional
+            Reads where the camera sits in their frame, float64 (4, 4); not asked where the
+            caller knows.
+
+        """
         if self.ground_truth == NO_TRUTH:
             return None
-        return read_poses(Path(self.ground_truth), stamps_ns)
+        if self.ground_truth is not None:
+            return read_poses(Path(self.ground_truth), stamps_ns)
+        poses = own()
+        if poses is None or mount is None or self.has_extrinsics:
+            return poses
+        return mounted(poses, mount())
 
 
 @dataclass(frozen=True)

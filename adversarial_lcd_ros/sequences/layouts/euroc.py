@@ -12,7 +12,7 @@ import yaml
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.image_files import file_sequence
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options, choose_camera
-from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, mounted, read_euroc
+from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, read_euroc
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.text_files import read_text, text_rows
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
@@ -49,7 +49,8 @@ def _open(folder: Path, options: Options) -> Sequence:
         if not paths[-1].is_file():
             raise SequenceError(f'{where}: there is no image {paths[-1]}')
     sensor = _sensor(folder / camera / _SENSOR)
-    trajectory = options.trajectory(stamps, lambda: _camera_poses(folder, camera, sensor))
+    trajectory = options.trajectory(stamps, lambda: _body_poses(folder),
+                                    lambda: _mount(folder, camera, sensor))
     recording = folder.resolve()
     return file_sequence(recording.parent if recording.name == 'mav0' else folder, paths, stamps,
                          trajectory, notes=notes,
@@ -69,22 +70,25 @@ def _sensor(path: Path) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _camera_poses(folder: Path, camera: str, sensor: dict[str, Any]) -> Trajectory | None:
-    truth = next((path for name in _TRUTH if (path := folder / name / _LIST).is_file()), None)
-    if truth is None:
-        return None
-    return mounted(read_euroc(truth), _mount(sensor, folder / camera / _SENSOR, truth))
+def _body_poses(folder: Path) -> Trajectory | None:
+    truth = _truth(folder)
+    return None if truth is None else read_euroc(truth)
 
 
-def _mount(sensor: dict[str, Any], path: Path, truth: Path) -> NDArray[np.float64]:
-    entry = sensor.get('T_BS')
+def _truth(folder: Path) -> Path | None:
+    return next((path for name in _TRUTH if (path := folder / name / _LIST).is_file()), None)
+
+
+def _mount(folder: Path, camera: str, sensor: dict[str, Any]) -> NDArray[np.float64]:
+    path, entry = folder / camera / _SENSOR, sensor.get('T_BS')
     numbers = entry.get('data') if isinstance(entry, dict) else entry
     try:
         mount = np.array(numbers, np.float64).reshape(4, 4)
     except (TypeError, ValueError):
         raise SequenceError(
-            f'EuRoC: {truth} has poses of the body, and {path} no T_BS (16 numbers: camera to '
-            'body): add it, or give --ground-truth none') from None
+            f'EuRoC: {_truth(folder)} has poses of the body, and {path} no T_BS (16 numbers: '
+            'camera to body): add it, or give it with --extrinsics, or --ground-truth none'
+        ) from None
     return check_pose_matrix(mount, f'{path}, T_BS')
 
 

@@ -39,7 +39,8 @@ def _open(folder: Path, options: Options) -> Sequence:
         raise SequenceError(f'{folder / camera} holds {len(paths)} images, {folder / _TIMES} '
                             f'{len(stamps)} times: expected one for each')
     projection = _projection(folder / _CALIBRATION, camera[-1])
-    trajectory = options.trajectory(stamps, lambda: _poses(folder, camera, stamps, projection))
+    trajectory = options.trajectory(stamps, lambda: _poses(folder, stamps),
+                                    lambda: _mount(folder, camera, projection))
     return file_sequence(folder, paths, stamps, trajectory, notes=notes, focal_length_px=None
                          if projection is None else float(projection[0, 0]))
 
@@ -67,24 +68,34 @@ def _projection(path: Path, number: str) -> NDArray[np.float64] | None:
     return None
 
 
-def _poses(folder: Path, camera: str, stamps: list[int],
-           projection: NDArray[np.float64] | None) -> Trajectory | None:
-    path = folder.resolve().parent.parent / 'poses' / f'{folder.resolve().name}.txt'
+def _poses(folder: Path, stamps: list[int]) -> Trajectory | None:
+    path = _truth(folder)
     if not path.is_file():
         return None
     poses = read_kitti(path)
     if len(poses) != len(stamps):
         raise SequenceError(f'{path} has {len(poses)} poses for {len(stamps)} frames: expected '
                             'one for each')
-    if camera != _CAMERAS[0]:
-        if projection is None:
-            raise SequenceError(f'{path} has poses of image_0, and {folder / _CALIBRATION} no '
-                                f'P{camera[-1]} to tell where {camera} sits: add it, or give '
-                                '--ground-truth none')
-        # P = K [1 | t]: the camera's centre is at -t on the axes of camera 0.
-        shift = np.append(-np.linalg.solve(projection[:, :3], projection[:, 3]), 1)
-        poses[:, :3, 3] = (poses @ shift)[:, :3]
     return matrix_trajectory(stamps, poses)
+
+
+def _truth(folder: Path) -> Path:
+    return folder.resolve().parent.parent / 'poses' / f'{folder.resolve().name}.txt'
+
+
+def _mount(folder: Path, camera: str,
+           projection: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """Return the pose of a camera on the axes of image_0, float64 (4, 4)."""
+    mount = np.eye(4)
+    if camera == _CAMERAS[0]:
+        return mount
+    if projection is None:
+        raise SequenceError(f'{_truth(folder)} has poses of image_0, and {folder / _CALIBRATION} '
+                            f'no P{camera[-1]} to tell where {camera} sits: add it, or give '
+                            '--extrinsics or --ground-truth none')
+    # P = K [1 | t]: the camera's centre is at -t on the axes of camera 0.
+    mount[:3, 3] = -np.linalg.solve(projection[:, :3], projection[:, 3])
+    return mount
 
 
 LAYOUT = Layout(NAME, 'times.txt beside image_0', _find, _open)

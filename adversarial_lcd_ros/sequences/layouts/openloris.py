@@ -12,7 +12,7 @@ from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences.image_files import file_sequence
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options, choose_camera
 from adversarial_lcd_ros.sequences.layouts.tum import list_images
-from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, mounted, read_tum
+from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, read_tum
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
@@ -38,23 +38,23 @@ def _cameras(folder: Path) -> list[str]:
 def _open(folder: Path, options: Options) -> Sequence:
     camera, notes = choose_camera(folder, NAME, _cameras(folder), options.camera)
     stamps, paths = list_images(folder / f'{camera}.txt')
-    trajectory = options.trajectory(stamps, lambda: _camera_poses(folder, _FRAMES[camera]))
+    trajectory = options.trajectory(stamps, lambda: _base_poses(folder),
+                                    lambda: _mount(folder, _FRAMES[camera]))
     return file_sequence(folder, paths, stamps, trajectory, notes=notes,
                          focal_length_px=_focal_length(folder / _SENSORS, _FRAMES[camera]))
 
 
-def _camera_poses(folder: Path, frame: str) -> Trajectory | None:
-    if not (folder / _TRUTH).is_file():
-        return None
-    if not (folder / _MOUNTS).is_file():
+def _base_poses(folder: Path) -> Trajectory | None:
+    return read_tum(folder / _TRUTH) if (folder / _TRUTH).is_file() else None
+
+
+def _mount(folder: Path, frame: str) -> NDArray[np.float64]:
+    """Return the camera's pose on the base: the product of the links up to it."""
+    path = folder / _MOUNTS
+    if not path.is_file():
         raise SequenceError(
             f'{folder / _TRUTH} has poses of {_BASE}, and no {_MOUNTS} beside it says where the '
-            f"camera sits: add it, or, if they are the camera's, give --ground-truth {_TRUTH}")
-    return mounted(read_tum(folder / _TRUTH), _mount(folder / _MOUNTS, frame))
-
-
-def _mount(path: Path, frame: str) -> NDArray[np.float64]:
-    """Return the camera's pose on the base: the product of the links up to it."""
+            "camera sits: add it, or give --extrinsics (identity, if they are the camera's)")
     links = {}
     storage = _storage(path)  # nodes do not keep it alive
     entries = storage.getNode('trans_matrix')
