@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.frame_poses import parse_extrinsics
 from adversarial_lcd_ros.sequences import import_sequence, open_sequence
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
-from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
 
 COUNT = 4
 PLACES = [(float(k), 0.0, 0.0) for k in range(COUNT)]

@@ -11,9 +11,9 @@ import pytest
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.frame_poses import parse_extrinsics
 from adversarial_lcd_ros.sequences import import_sequence, open_sequence
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
-from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
 from adversarial_lcd_ros.sequences.on_the_way import imported, is_imported
 from adversarial_lcd_ros.sequences.replay import Replay
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.pose_files import (
+from adversarial_lcd_ros.poses.pose_files import (
     matrix_trajectory,
     mounted,
     read_euroc,

@@ -94,8 +94,8 @@ def add_source_options(parser: ArgumentParser) -> None:
 
 def source_options(options: Namespace) -> dict[str, Any]:
     """Return the arguments of ``open_sequence`` that were given; empty if none was."""
+    from adversarial_lcd_ros.poses.frame_poses import parse_extrinsics
     from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
-    from adversarial_lcd_ros.sequences.frame_poses import parse_extrinsics
 
     given = {name: value for name in ('topic', 'ground_truth', 'rate_hz', 'camera', 'stamps')
              if (value := getattr(options, name)) is not None}

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.compiled.shared_surface import shared_surface
 from adversarial_lcd_ros.errors import EvaluationError, FileError, SequenceError
 from adversarial_lcd_ros.files.arrays import read_npz
+from adversarial_lcd_ros.files.text import text_rows
+from adversarial_lcd_ros.poses.trajectory import parse_stamp_ns
 from adversarial_lcd_ros.sequences.companions import DEPTH_ARCHIVE
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
 
 DEPTH_LIST = 'depth.txt'
 # Depth of a wall is one number over and over: deflate reaches its most.

@@ -1,5 +1,6 @@
 """Frames and ground truth in, from whatever a sequence was published as; a bag out."""
 
+from adversarial_lcd_ros.poses.trajectory import PLACE_INDEX, WORLD, Trajectory
 from adversarial_lcd_ros.sequences.frame import Frame
 from adversarial_lcd_ros.sequences.importing import (
     GROUND_TRUTH_TOPIC,
@@ -9,7 +10,6 @@ from adversarial_lcd_ros.sequences.importing import (
 )
 from adversarial_lcd_ros.sequences.opening import open_sequence
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX, WORLD, Trajectory
 
 __all__ = ['GROUND_TRUTH_TOPIC', 'IMAGE_TOPIC', 'PLACE_INDEX', 'WORLD', 'Frame', 'ImportSummary',
            'Sequence', 'Trajectory', 'import_sequence', 'open_sequence']

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.frame_poses import by_number, read_poses
+from adversarial_lcd_ros.poses.pose_files import mounted
+from adversarial_lcd_ros.poses.trajectory import PLACE_INDEX, Trajectory
 from adversarial_lcd_ros.sequences.bagfile import OLD_TF, TF, BagFile
-from adversarial_lcd_ros.sequences.frame_poses import by_number, read_poses
-from adversarial_lcd_ros.sequences.pose_files import mounted
 from adversarial_lcd_ros.sequences.pose_topics import (
     ODOMETRY,
     POSE_TYPES,
@@ -21,7 +22,6 @@ from adversarial_lcd_ros.sequences.pose_topics import (
     topic_poses,
 )
 from adversarial_lcd_ros.sequences.stamps import LOG
-from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX, Trajectory
 from adversarial_lcd_ros.sequences.transforms import (
     FrameTree,
     Link,

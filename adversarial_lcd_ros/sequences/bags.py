@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import CodecError, SequenceError
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.bag_truth import BagTruth, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BagFile
 from adversarial_lcd_ros.sequences.encodings import DEPTH, is_camera, message_pixels
 from adversarial_lcd_ros.sequences.frame import Frame, check_camera_file, open_compressed
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.stamps import LOG, frame_stamps
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 
 def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.text_files import read_text
-from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
+from adversarial_lcd_ros.files.text import read_text
+from adversarial_lcd_ros.poses.trajectory import parse_stamp_ns
 
 DETECTIONS_FILE = 'detections.csv'
 COLUMNS = ('timestamp', 'class', 'x', 'y', 'w', 'h', 'score')

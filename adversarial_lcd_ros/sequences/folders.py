@@ -11,9 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.frame_poses import image_poses, read_poses
+from adversarial_lcd_ros.poses.pose_files import (
+    check_pose_matrix,
+    matrix_trajectory,
+    read_matrices,
+)
+from adversarial_lcd_ros.poses.trajectory import PLACE_INDEX, Trajectory
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE, read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE, Frame
-from adversarial_lcd_ros.sequences.frame_poses import image_poses, read_poses
 from adversarial_lcd_ros.sequences.image_choice import camera_images, named_stamps
 from adversarial_lcd_ros.sequences.image_files import (
     file_sequence,
@@ -24,13 +30,7 @@ from adversarial_lcd_ros.sequences.image_files import (
     ticks,
 )
 from adversarial_lcd_ros.sequences.layouts.tum import list_images
-from adversarial_lcd_ros.sequences.pose_files import (
-    check_pose_matrix,
-    matrix_trajectory,
-    read_matrices,
-)
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX, Trajectory
 
 TUM_IMAGES, TUM_TRUTH = 'rgb.txt', 'groundtruth.txt'
 # Longer than any gap that a detector or a label leaves between a frame and its loops.

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import FileError, SequenceError
 from adversarial_lcd_ros.files.reading import MIB, read_bytes
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.frame import Frame, is_depth_file, open_compressed
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 DEFAULT_RATE_HZ = 30.0
 _SUFFIXES = ('.jpg', '.jpeg', '.png', '.webp')

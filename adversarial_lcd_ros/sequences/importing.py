@@ -12,6 +12,7 @@ import numpy as np
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.messages.codec import typestore
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.bag_truth import TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, POSE, BagWriter
 from adversarial_lcd_ros.sequences.cdr import header
@@ -19,7 +20,6 @@ from adversarial_lcd_ros.sequences.companions import companions_of
 from adversarial_lcd_ros.sequences.frame import JPEG, PNG, Frame
 from adversarial_lcd_ros.sequences.opening import open_sequence
 from adversarial_lcd_ros.sequences.sequence import Coverage, Progress, Sequence
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 IMAGE_TOPIC, GROUND_TRUTH_TOPIC = '/image/compressed', '/ground_truth'
 CAMERA_INFO_TOPIC = '/camera_info'

@@ -8,6 +8,8 @@ from pathlib import Path
 import shlex
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.pose_files import mounted
+from adversarial_lcd_ros.poses.trajectory import PLACE_INDEX
 from adversarial_lcd_ros.sequences import folders
 from adversarial_lcd_ros.sequences.bag_truth import NO_TRUTH, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import is_bag
@@ -15,9 +17,7 @@ from adversarial_lcd_ros.sequences.bags import bag_sequence
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE
 from adversarial_lcd_ros.sequences.image_files import images_in, is_hidden
 from adversarial_lcd_ros.sequences.layouts import LAYOUTS, Options, find_layout
-from adversarial_lcd_ros.sequences.pose_files import mounted
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import PLACE_INDEX
 from adversarial_lcd_ros.sequences.video import is_video, video_sequence
 
 _MAX_NAMED = 8

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.bagfile import POSE, BagFile
 from adversarial_lcd_ros.sequences.stamps import REMEDY
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 POSE_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 ODOMETRY, PATH = 'nav_msgs/msg/Odometry', 'nav_msgs/msg/Path'

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.trajectory import TOLERANCE_NS, Trajectory
 from adversarial_lcd_ros.sequences.frame import Frame
-from adversarial_lcd_ros.sequences.trajectory import TOLERANCE_NS, Trajectory
 
 # Called with how many of how many frames, or other steps, are done.
 Progress = Callable[[int, int], None]

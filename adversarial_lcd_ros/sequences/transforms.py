@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.trajectory import WORLD, Trajectory
 from adversarial_lcd_ros.sequences.bagfile import OLD_TF, TF, BagFile
-from adversarial_lcd_ros.sequences.trajectory import WORLD, Trajectory
 
 # A mount is published again and again: what wanders less than this stands still.
 _STILL_M = 1e-4

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.frame import Frame
 from adversarial_lcd_ros.sequences.image_files import ticks
 from adversarial_lcd_ros.sequences.layouts.base import Options
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 SUFFIXES = ('.mp4', '.avi', '.mkv', '.mov', '.webm', '.m4v', '.mpg', '.mpeg', '.ogv', '.wmv')
 _REMEDY = 'get it again, or convert it: ffmpeg -i VIDEO whole.mp4'

@@ -8,11 +8,11 @@ import math
 from pathlib import Path
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.text import text_rows
 from adversarial_lcd_ros.sequences.detections import COLUMNS, MAX_CLASS
 from adversarial_lcd_ros.sequences.image_choice import named_stamps
 from adversarial_lcd_ros.sequences.image_files import is_hidden
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.text_files import text_rows
 
 # Beside the labels there may be the names of the classes.
 _NO_LABELS = ('classes.txt', 'labels.txt', 'notes.txt', 'readme.txt')

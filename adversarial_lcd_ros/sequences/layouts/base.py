@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.frame_poses import read_poses
-from adversarial_lcd_ros.sequences.pose_files import mounted
+from adversarial_lcd_ros.poses.frame_poses import read_poses
+from adversarial_lcd_ros.poses.pose_files import mounted
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 NO_TRUTH = 'none'
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 import yaml
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.text import read_text, text_rows
+from adversarial_lcd_ros.poses.pose_files import check_pose_matrix, read_euroc
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.image_files import file_sequence
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options, choose_camera
-from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, read_euroc
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.text_files import read_text, text_rows
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 NAME = 'EuRoC, TUM-VI'
 _LIST, _PICTURES, _SENSOR = 'data.csv', 'data', 'sensor.yaml'

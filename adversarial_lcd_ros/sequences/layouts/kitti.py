@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.text import text_rows
+from adversarial_lcd_ros.poses.pose_files import matrix_trajectory, read_kitti
+from adversarial_lcd_ros.poses.trajectory import Trajectory, parse_stamp_ns
 from adversarial_lcd_ros.sequences.image_files import file_sequence, images_in
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options, choose_camera
-from adversarial_lcd_ros.sequences.pose_files import matrix_trajectory, read_kitti
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import Trajectory, parse_stamp_ns
 
 NAME = 'KITTI odometry'
 _TIMES, _CALIBRATION = 'times.txt', 'calib.txt'

@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.text import read_text, text_rows
+from adversarial_lcd_ros.poses.pose_files import matrix_trajectory, read_matrices
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.image_files import (
     file_sequence,
     images_in,
@@ -15,10 +18,7 @@ from adversarial_lcd_ros.sequences.image_files import (
     ticks,
 )
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options
-from adversarial_lcd_ros.sequences.pose_files import matrix_trajectory, read_matrices
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.text_files import read_text, text_rows
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 REPLICA, SCANNET = 'Replica', 'ScanNet'
 _COLOUR = ('color', 'colour', 'rgb', 'results', 'images', 'image')

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.poses.pose_files import check_pose_matrix, read_tum
+from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.image_files import file_sequence
 from adversarial_lcd_ros.sequences.layouts.base import Layout, Options, choose_camera
 from adversarial_lcd_ros.sequences.layouts.tum import list_images
-from adversarial_lcd_ros.sequences.pose_files import check_pose_matrix, read_tum
 from adversarial_lcd_ros.sequences.sequence import Sequence
-from adversarial_lcd_ros.sequences.trajectory import Trajectory
 
 NAME = 'OpenLORIS'
 # Camera to the frame that its calibration is under.

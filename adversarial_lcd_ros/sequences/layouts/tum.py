@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import parse_stamp_ns
+from adversarial_lcd_ros.files.text import text_rows
+from adversarial_lcd_ros.poses.trajectory import parse_stamp_ns
 
 
 def list_images(path: Path) -> tuple[list[int], list[Path]]:

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.pose_files import (
+from adversarial_lcd_ros.files.text import text_rows
+from adversarial_lcd_ros.poses.pose_files import (
     check_pose_matrix,
     matrix_trajectory,
     read_euroc,
@@ -18,8 +19,7 @@ from adversarial_lcd_ros.sequences.pose_files import (
     read_matrices,
     read_tum,
 )
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import TOLERANCE_NS, Trajectory
+from adversarial_lcd_ros.poses.trajectory import TOLERANCE_NS, Trajectory
 
 _TUM, _KITTI, _MATRICES = 8, 12, (4, 16)
 _FORMS = ('TUM (timestamp tx ty tz qx qy qz qw), EuRoC (timestamp,x,y,z,qw,qx,qy,qz), KITTI (12 '

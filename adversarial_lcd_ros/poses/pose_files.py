@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.text_files import text_rows
-from adversarial_lcd_ros.sequences.trajectory import NORM_TOLERANCE, Trajectory, parse_stamp_ns
+from adversarial_lcd_ros.files.text import text_rows
+from adversarial_lcd_ros.poses.trajectory import NORM_TOLERANCE, Trajectory, parse_stamp_ns
 
 _MAX_NS = 2**63 - 1
 _ORTHOGONAL_TOLERANCE = 0.01

@@ -1,0 +1,1 @@
+"""Where a camera was: trajectories, and the files that hold them."""
