@@ -74,8 +74,8 @@ def test_matching_looks_at_the_clock_between_its_steps(monkeypatch, step):
     memory.add(GRAPH)
     monkeypatch.setattr(deadline_module.time, 'monotonic', lambda: float(past[0]))
     monkeypatch.setattr(memory_module, step, slow)
-    monkeypatch.setattr(memory_module, {'mutual': '_match_objects', '_match_objects': 'Echo'}[step],
-                        after)
+    following = {'mutual': '_match_objects', '_match_objects': 'Echo'}[step]
+    monkeypatch.setattr(memory_module, following, after)
     with deadline_module.ending_at(0.5), pytest.raises(BudgetError, match='deadline'):
         memory.echo(GRAPH, 0)
 
