@@ -204,15 +204,21 @@ def killed(name: str, command: Command, count: int, work: Path, seed: int = 0) -
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)
         process.wait()
-        outcome.outcomes[_left_after(command, mark, out) or (
-            'done by the second run' if (again := _ended(command, command.start(out), out))
-            == 'done' or (process.returncode == 0 and again == 'one line, exit 2')
-            else f'BROKEN {again}')] += 1
+        outcome.outcomes[_left_after(command, mark, out) or _again(command, out)] += 1
         if process.stderr:
             process.stderr.close()
         _clear(out)
     outcome.note = _left(work)
     return outcome
+
+
+def _again(command: Command, out: Path) -> str:
+    """Run a command that was killed again; return what came of it."""
+    was_whole = command.is_whole(out)
+    again = _ended(command, command.start(out), out)
+    if was_whole and again in ('done', 'one line, exit 2'):
+        return 'was done when it was killed'
+    return 'done by the second run' if again == 'done' else f'BROKEN {again}'
 
 
 def _left_after(command: Command, mark: str, out: Path) -> str:
