@@ -2,7 +2,7 @@
 # make paper: the paper's experiments over the sequences in DATA; report in results/paper
 # make target: the detectors before any attack, on the sequences in DATA; tables in results/target
 # make test, make lint, make bench, make clean
-# make soak: an hour of faults; docs/reliability.md tells what came of it
+# make soak: an hour of faults (ARGS='--only messages'); docs/reliability.md tells what came of it
 # make lock, make licences: renew requirements/ and docs/licences.md
 #
 # The first target sets up .venv (releases and digests: requirements/) and the object model; after

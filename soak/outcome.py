@@ -61,8 +61,14 @@ class Slope:
         self._at.append(count)
         self._mb.append(megabytes)
 
+    def is_due(self, count: float, every: float) -> bool:
+        """Tell whether the last sample is so long ago."""
+        return not self._at or count >= self._at[-1] + every
+
     def text(self, per: float, unit: str) -> str:
-        """Return the slope with its 95 % interval, KB for so many of a unit."""
+        """Return the slope with its 95 % interval, KB for so many of a unit; '' of nothing."""
+        if not self._at:
+            return ''
         skip = len(self._at) // 4  # what is loaded and cached once
         at, mb = np.array(self._at[skip:]) / per, np.array(self._mb[skip:]) * 1024
         if len(at) < 5:

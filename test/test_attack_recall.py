@@ -8,9 +8,12 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from adversarial_lcd_ros.attack import deadline as deadline_module
+from adversarial_lcd_ros.attack import memory as memory_module
 from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
+from adversarial_lcd_ros.errors import BudgetError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.lcd.decision import probability
 from adversarial_lcd_ros.messages.types import LcdAnswer
@@ -53,6 +56,28 @@ def remembering(*seen, config=SETTINGS):
     for graph in seen:
         attacker.process(graph, Detector([], 1))
     return attacker
+
+
+@pytest.mark.parametrize('step', ['mutual', '_match_objects'])
+def test_matching_looks_at_the_clock_between_its_steps(monkeypatch, step):
+    past = [False]
+    known = getattr(memory_module, step)
+
+    def slow(*given):
+        past[0] = True
+        return known(*given)
+
+    def after(*given):
+        pytest.fail('matched on beyond the deadline')
+
+    memory = Memory()
+    memory.add(GRAPH)
+    monkeypatch.setattr(deadline_module.time, 'monotonic', lambda: float(past[0]))
+    monkeypatch.setattr(memory_module, step, slow)
+    following = {'mutual': '_match_objects', '_match_objects': 'Echo'}[step]
+    monkeypatch.setattr(memory_module, following, after)
+    with deadline_module.ending_at(0.5), pytest.raises(BudgetError, match='deadline'):
+        memory.echo(GRAPH, 0)
 
 
 def test_an_echo_of_the_same_graph_is_its_edges():

@@ -271,6 +271,21 @@ def test_the_machine_is_named(ros, lcd):
     assert found[0].hardware_id == socket.gethostname()
 
 
+def test_a_status_goes_out_between_messages_where_its_timer_does_not_get_a_turn(ros, lcd):
+    found = ros.collect('/diagnostics', lambda message: {
+        entry.key for entry in message.status[0].values}, DiagnosticArray, raw=False)
+    ros.until(lambda: found)
+    lcd.diagnostics._timer.cancel()
+    lcd.diagnostics.count('seen here alone')
+    callback = lcd.diagnostics.guard('message', lambda: None)
+    lcd.diagnostics._last_s -= 60
+    callback()
+    last_s = lcd.diagnostics._last_s
+    ros.until(lambda: any('seen here alone' in keys for keys in found))
+    callback()  # not with every message
+    assert lcd.diagnostics._last_s == last_s
+
+
 @pytest.mark.parametrize('mode', ['query', 'surrogate'])
 def test_a_search_that_does_not_end_keeps_no_graph(ros, monkeypatch, mode):
     node = ros.start(AttackerNode, mode=mode, ratio=0.01, deadline_ms=50.0)

@@ -19,6 +19,7 @@ from rclpy.node import Node
 from adversarial_lcd_ros.errors import AdversarialLcdError
 
 PERIOD_S = 1.0
+_LATE_S = 1.5 * PERIOD_S
 TOPIC = '/diagnostics'
 DEFECTS = 'defects'
 _KEPT_LATENCIES = 1000
@@ -46,7 +47,7 @@ class Diagnostics:
     def __init__(self, node: Node, activity: str) -> None:
         self._node = node
         self._activity = activity
-        self._lock = Lock()
+        self._lock, self._publishing = Lock(), Lock()
         self._counts: Counter[str] = Counter()
         self._worries: set[str] = set()
         self._said_s: dict[str, float] = {}
@@ -114,7 +115,22 @@ class Diagnostics:
                 self.refuse(what, error)
             except Exception:
                 self.defect(what)
+            self._catch_up()
         return guarded
+
+    def _catch_up(self) -> None:
+        """
+        Publish the status where the timer does not get a turn.
+
+        The executor of events works off messages in the order in which they came, those
+        included that have given way to newer ones: a node with more of them than it can manage
+        would be silent just then.
+        """
+        if time.monotonic() > self._last_s + _LATE_S:
+            try:
+                self.publish()
+            except Exception:
+                self.defect('status')
 
     def _is_due(self, key: str) -> bool:
         now_s = time.monotonic()
@@ -141,7 +157,11 @@ class Diagnostics:
         return ', '.join(f'{name} {counts[name]}' for name in sorted(counts)) or 'nothing received'
 
     def publish(self) -> None:
-        """Publish the status of the node."""
+        """Publish the status of the node; from any thread."""
+        with self._publishing:
+            self._publish()
+
+    def _publish(self) -> None:
         with self._lock:
             counts, worries = self._counts.copy(), set(self._worries)
         now_s = time.monotonic()
