@@ -8,8 +8,10 @@ imports nothing but the standard library's own small parts.
 from __future__ import annotations
 
 import _thread
+import atexit
 import codecs
 from collections.abc import Mapping
+from contextlib import suppress
 import importlib
 import importlib.util
 import os
@@ -26,6 +28,7 @@ _GRACE_S = 1.5
 _PR_SET_PDEATHSIG = 1
 _PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x'}
 _ERRORS = 'adversarial_lcd_plain'
+_interrupted: list[int] = []  # the exit code, once a signal came
 
 
 def interruptible(exit_code: int) -> None:
@@ -43,11 +46,22 @@ def interruptible(exit_code: int) -> None:
     """
     def interrupt(number: int, frame: FrameType | None) -> None:
         ignore_signals()
+        _interrupted.append(exit_code)
         # Not threading.Thread: its locks may be held by what was interrupted here.
         _thread.start_new_thread(_cut_off, (exit_code,))
         raise KeyboardInterrupt
     for number in SIGNALS:
         signal.signal(number, interrupt)
+
+
+def _leave() -> None:
+    # Python ends a process by SIGINT, whatever its exit code, once a KeyboardInterrupt has passed
+    # through exec of a text (dataclasses make their methods so), also if it was caught.
+    if _interrupted:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(_interrupted[0])
 
 
 def _cut_off(exit_code: int) -> None:
@@ -178,3 +192,7 @@ def graph_builder() -> int:
 def lcd() -> int:
     """Be the node lcd."""
     return run_node_process('lcd')
+
+
+# What is registered first runs last, when all others have cleaned up.
+atexit.register(_leave)

@@ -151,7 +151,7 @@ def test_node_parameter_file_serves_as_settings_file(tmp_path):
     ('lcs: {target: wl}', r"unknown section 'lcs'; there are: .*lcd"),
     ('- 1', 'expected sections, found list'),
     ('lcd: 3', 'expected NAME: VALUE, found 3'),
-    ('a: [', r'settings\.yaml: while parsing'),
+    ('a: [', r'settings\.yaml cannot be read as YAML: while parsing'),
 ])
 def test_bad_settings_file_is_refused_with_its_reason(tmp_path, text, message):
     file = tmp_path / 'settings.yaml'

@@ -19,7 +19,7 @@ MOST_WORDS = 1500
 OF_OTHER_PROGRAMS = {
     '--break-system-packages', '--from-paths', '--ignore-src', '--user',  # pip, rosdep
     '--params-file', '--ros-args', '--show-args', '--help',  # ROS
-    '--nthreads', '--scale', '--strict', '--upgrade'}  # dask, soak, mypy, make lock
+    '--nthreads', '--only', '--scale', '--strict', '--upgrade'}  # dask, soak, mypy, lock
 CODE = re.compile(r'```.*?```|`[^`]+`', re.S)
 COMMAND = re.compile(r'\badversarial-lcd ([a-z][a-z-]*)([^`\n]*)')
 OPTION = re.compile(r'(?<![\w-])--[a-z][\w-]*')

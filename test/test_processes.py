@@ -146,6 +146,19 @@ def test_a_node_that_is_interrupted_before_it_is_ready_ends_with_0(tmp_path, sta
     assert 'Traceback' not in log.read_text()
 
 
+def test_an_interrupt_within_an_executed_text_keeps_its_exit_code():
+    process = subprocess.Popen(
+        [sys.executable, '-c', 'from adversarial_lcd_ros.start import interruptible\n'
+         'interruptible(130)\ntry:\n'
+         '    exec("import time\\nprint(1, flush=True)\\ntime.sleep(600)")\n'
+         'except KeyboardInterrupt:\n    print("caught")'],
+        env=environment(), stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == '1\n'
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=DEADLINE_S)[0] == 'caught\n'
+    assert process.returncode == 130
+
+
 def test_code_that_swallows_the_interrupt_is_cut_off():
     process = subprocess.Popen(
         [sys.executable, '-c', 'from adversarial_lcd_ros.start import interruptible\n'
