@@ -87,7 +87,7 @@ def test_greedy_step(record, tour_graphs, features):
     for graph in graphs[:35]:
         detector.detect(graph)
     graph = graphs[35]
-    references = detector.query_nodes(graph).comparison
+    references = detector.query_nodes(graph).compared.nodes
     assert len(references) >= 10
     scorer, pairs = FlipScorer(detector, graph), some_pairs(graph)
     found = scorer.logits(graph, pairs)
