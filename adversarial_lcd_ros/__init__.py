@@ -8,6 +8,7 @@ used, so that importing the package costs nothing, and none of it needs ROS.
 from __future__ import annotations
 
 from importlib import import_module
+import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
     from adversarial_lcd_ros.sequences import open_sequence
     from adversarial_lcd_ros.vision.builder import GraphBuilder
-
-import os
 
 # onnxruntime from 1.32 on reports to its vendor unless told not to before it is imported. This
 # package is what every process of ours, also a worker's, imports first.

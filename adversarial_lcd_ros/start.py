@@ -41,7 +41,7 @@ def interruptible(exit_code: int) -> None:
     Parameters
     ----------
     exit_code : int
-        Of a process that is cut off.
+        Of a process that was interrupted, or cut off.
 
     """
     def interrupt(number: int, frame: FrameType | None) -> None:
