@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+# Where the ranks of what is not the paper's, of ours, and of yardsticks begin.
+OTHERS_RANK, OURS_RANK, YARDSTICK_RANK = 20, 100, 200
 
 class Shown:
     """
@@ -16,8 +18,8 @@ class Shown:
     title : str
         In words; '': the name, with blanks.
     rank : int
-        Place among the columns of a table: the paper's from 0 on, then what is new, from 100 on
-        ours, from 200 on yardsticks.
+        Place among the columns of a table: the paper's from 0 on, from 20 on what is new, from
+        100 on ours, from 200 on yardsticks.
     colour : str
         Of its curves, the same in every plot; '': one by its name.
     marker, dash : str

@@ -4,6 +4,7 @@ from html.parser import HTMLParser
 import io
 import json
 
+from graph_factory import make_graph
 import numpy as np
 import pytest
 from rich.console import Console
@@ -12,8 +13,11 @@ from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import results, wording
+from adversarial_lcd_ros.evaluation.methods import whose
+from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay import report, tables
+from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
@@ -24,7 +28,9 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
+from adversarial_lcd_ros.lcd.geometry import count_inliers
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
+from adversarial_lcd_ros.registry import PERTURBATIONS
 
 COUNT = 60
 ATTACKS = {'eigen': AttackConfig(), 'walk': AttackConfig(perturbation='random_walk',
@@ -207,6 +213,7 @@ def test_report_needs_nothing_but_itself(folder):
     assert '@import' not in text
     assert 'url(' not in text
     assert '<script' not in text
+    assert '<th>' not in text  # a screen reader is told what a heading is of
     assert sum(source.startswith('data:image/jpeg') for source in page.sources) == 6
     assert 'a & b' in page.text
     assert '<evaluate>' in page.text
@@ -241,6 +248,70 @@ def test_headline_is_careful(summary):
     assert 'took' in wording.headline(summary)
     nothing = {**summary, 'attacks': summary['attacks'][1:]}
     assert wording.headline(nothing).startswith('No attack lowered')
+
+
+def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
+    eigen, walk = summary['attacks']
+    ours = {**walk, 'name': 'recall', 'search': 'recall', 'perturbation': '',
+            'decline_pp': 20.0, 'decline_ci95': (9.0, 30.0)}
+    text = wording.headline({**summary, 'attacks': [eigen, ours]})
+    assert "The attack recall, this project's own, took 20.0 points" in text
+    assert f"The paper's own (eigen) took {wording.points(eigen['decline_pp'])} points" in text
+    assert "The attack eigen, the paper's, took" in wording.headline(summary)
+
+
+def test_the_owner_of_an_attack_comes_from_its_class():
+    owner = {method: whose({'perturbation': method, 'search': 'stepwise'})
+             for method in PERTURBATIONS}
+    assert set(owner.values()) == {'paper'}
+    assert whose({'perturbation': '', 'search': 'recall'}) == 'ours'
+    assert whose({'perturbation': '', 'search': 'optimum'}) == 'control'
+    assert whose({'perturbation': None, 'search': None}) == ''
+
+
+def test_a_check_behind_the_detector_takes_loops_back(records):
+    # The check bears out what is right, and no loop of the attacked run with another place.
+    asked = [replace(record, support=(2.0 if record.match_correct else 0.5)
+                     if record.is_loop else None) for record in records]
+    found = summarise('walks', asked, ATTACKS, GraphStatistics.of([1] * COUNT, [1] * COUNT), 1,
+                      LcdConfig())
+    eigen = found['behind_check']['attacks'][0]
+    assert (eigen['invented'], eigen['fp'], eigen['wrong_matches']) == (0, 0, 0)
+    assert eigen['suppressed'] == found['attacks'][0]['suppressed']  # one wrong match among them
+    assert found['detector'] == {'target': 'wl', 'threshold': 0.5, 'defences': []}
+    assert wording.behind_rows(found)[0]['invented'] == '0 of 22'
+    assert any('geometric check' in text for text in wording.meaning(found))
+
+
+def test_without_the_check_asked_there_are_no_rows_of_it(summary):
+    assert summary['behind_check'] is None
+    assert wording.behind_rows(summary) == []
+    assert not any('geometric check' in text for text in wording.meaning(summary))
+
+
+def test_the_check_is_asked_of_the_graphs_that_the_detector_got(records):
+    graphs = [make_graph(42, [], 2, index % 5) for index in range(COUNT)]
+    sent = {name: graphs for name in runs_of(records)}
+    asked = ask_check(records, sent, LcdConfig())
+    for record in asked:
+        known = record.is_loop and record.match_frame is not None
+        assert (record.support is not None) == known
+        if known:
+            assert record.support == count_inliers(
+                graphs[record.frame], graphs[record.match_frame], 3.0) / 20
+    same = ask_check(records, sent, LcdConfig(geometric_check=True))
+    assert all(record.support is None for record in same)
+
+
+def test_text_in_the_colours_of_attacks_can_be_read():
+    def luminance(colour):
+        parts = [int(colour[at:at + 2], 16) / 255 for at in (1, 3, 5)]
+        return np.dot([0.2126, 0.7152, 0.0722], [
+            part / 12.92 if part <= 0.03928 else ((part + 0.055) / 1.055) ** 2.4
+            for part in parts])
+
+    for colour in (*ATTACK_COLOURS, CLEAN_COLOUR):
+        assert 1.05 / (luminance(colour) + 0.05) >= 4.5, colour
 
 
 def test_terminal_tables(summary):

@@ -9,7 +9,7 @@ from typing import Any
 from adversarial_lcd_ros.attack.search import COMMON_SETTINGS
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.registry import PERTURBATIONS, SEARCHES, SURROGATES, YARDSTICKS
-from adversarial_lcd_ros.shown import Shown
+from adversarial_lcd_ros.shown import OTHERS_RANK, OURS_RANK, YARDSTICK_RANK, Shown
 
 # Columns of a row that say what ran; '' where a search has no such thing.
 COLUMNS = ('search', 'perturbation', 'surrogate')
@@ -38,6 +38,20 @@ def is_yardstick(row: Mapping[str, Any]) -> bool:
 def method_of(row: Mapping[str, Any]) -> str:
     """Return the name of what chooses the flips: a perturbation, or else a search."""
     return str(row['perturbation'] or row['search'])
+
+
+def whose(row: Mapping[str, Any]) -> str:
+    """
+    Return where what chooses the flips comes from, by its rank (``Shown``).
+
+    'paper', 'ours', 'control' for what looks into the detector, 'other' for all else; '' where
+    nobody knows what ran, or nothing was changed.
+    """
+    if not method_of(row) or method_of(row) == 'None':
+        return ''
+    rank = method_facts(method_of(row)).rank
+    return ('paper' if rank < OTHERS_RANK else 'other' if rank < OURS_RANK else
+            'ours' if rank < YARDSTICK_RANK else 'control')
 
 
 def method_facts(method: str) -> type[Shown]:

@@ -9,7 +9,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 CLEAN_COLOUR = '#2f5d8a'
-ATTACK_COLOURS = ('#c0392b', '#d08700', '#7a4a9c', '#2e8064', '#8c564b', '#5f6b73')
+# Titles are set in them: each has a contrast of at least 4.5 on white.
+ATTACK_COLOURS = ('#c0392b', '#9c6400', '#7a4a9c', '#2e8064', '#8c564b', '#5f6b73')
 INK, GRID = '#33373d', '#dddfe3'
 STYLE = {
     'font.family': 'DejaVu Sans', 'font.size': 9.0, 'axes.edgecolor': '#9aa0a8',

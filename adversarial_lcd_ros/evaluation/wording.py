@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from adversarial_lcd_ros.evaluation.methods import method_of, surrogate_facts
+from adversarial_lcd_ros.evaluation.methods import method_of, surrogate_facts, whose
 from adversarial_lcd_ros.registry import NONE
 
 UNDEFINED = 'n/a'
@@ -114,10 +114,86 @@ def headline(summary: Mapping[str, Any]) -> str:
                 f'to {percent(attack["balanced_accuracy"])}: a decline of '
                 f'{points(attack["decline_pp"])} points (95{_NARROW_SPACE}% interval '
                 f'{interval(bounds)}), with {effort}.')
-    return (f'The attack took {points(attack["decline_pp"])} points off the balanced accuracy of '
-            f'loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
+    return (f'{_subject(attack)} took {points(attack["decline_pp"])} points off the balanced '
+            f'accuracy of loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
             f'{percent(attack["balanced_accuracy"])} (95{_NARROW_SPACE}% interval of the decline '
-            f'{interval(bounds)}), with {effort}. {sentence(_changes(summary, attack))}.')
+            f'{interval(bounds)}), with {effort}. {sentence(_changes(summary, attack))}.'
+            f'{_papers_own(summary, attack)}')
+
+
+def _subject(attack: Attack) -> str:
+    """Return the attack of a headline: its name, and whose it is."""
+    owner = {'paper': "the paper's", 'ours': "this project's own"}.get(whose(attack))
+    return f'The attack {attack_title(attack)}{f", {owner}," if owner else ""}'
+
+
+def _papers_own(summary: Mapping[str, Any], strongest_attack: Attack) -> str:
+    """Return a sentence on the paper's own attack beside the strongest, if it is another."""
+    own = [attack for attack in summary['attacks'] if attack['decline_pp'] is not None
+           and attack['perturbation'] == 'eigencentrality' and attack is not strongest_attack]
+    if not own or strongest_attack['perturbation'] == 'eigencentrality':
+        return ''
+    best = max(own, key=lambda attack: float(attack['decline_pp']))
+    return (f" The paper's own ({attack_title(best)}) took {points(best['decline_pp'])} points "
+            f'({interval(best["decline_ci95"]) or UNDEFINED}).')
+
+
+def detector_title(detector: Mapping[str, Any] | None) -> str:
+    """Return what has to be known of the detector beside its figures, in words."""
+    if not detector:
+        return ''
+    defences = [name.replace('_', ' ') for name in detector['defences']]
+    return (f'detector {detector["target"]}, threshold {detector["threshold"]:g}, '
+            f'{"behind " + ", ".join(defences) if defences else "no defence"}')
+
+
+def meaning(summary: Mapping[str, Any]) -> list[str]:
+    """Return what the figures mean for a robot, in plain sentences; none without an attack."""
+    attack = strongest(summary)
+    if attack is None or not is_labelled(summary) or not summary['nodes_mean']:
+        return []
+    told = []
+    if attack['suppressed']:
+        told.append(f'Of {summary["clean"]["tp"]} places that the robot recognised, '
+                    f'{attack["suppressed"]} went unrecognised under {attack_title(attack)}: its '
+                    'drift would not be corrected there.')
+    if attack['invented']:
+        told.append(f'At {attack["invented"]} of {summary["clean"]["tn"]} places where it had '
+                    'never been it believed to be back: each such loop can bend the map, and one '
+                    'can be enough.')
+    if not told:
+        told.append('On this sequence no attack made the robot miss or imagine a place.')
+    told += _meaning_of_check(summary, attack)
+    return [*told, 'All this takes somebody who can change graphs on their way from the builder '
+            'to the detector, or who can publish in the name of the builder.']
+
+
+def _meaning_of_check(summary: Mapping[str, Any], attack: Attack) -> list[str]:
+    behind = summary.get('behind_check')
+    if not behind:
+        return []
+    row = next(row for row in behind['attacks'] if row['name'] == attack['name'])
+    return [f'A geometric check behind the detector, of which the attack did not know, would '
+            f'leave {row["invented"]} imagined and {row["suppressed"]} unrecognised places: it '
+            'can refuse a false loop, but not bring back a lost one.']
+
+
+def behind_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return what a geometric check behind the detector would leave, one row an attack."""
+    found = summary.get('behind_check')
+    if not found:
+        return []
+    clean = found['clean']
+    title_of = {attack['name']: attack_title(attack) for attack in summary['attacks']}
+    return [{
+        'attack': title_of[row['name']],
+        'balanced accuracy': (f'{percent(clean["balanced_accuracy"])} → '
+                              f'{percent(row["balanced_accuracy"])}'),
+        'decline, points': points(row['decline_pp']),
+        '95 % interval': interval(row['decline_ci95']) or UNDEFINED,
+        'suppressed': f'{row["suppressed"]} of {clean["tp"]}',
+        'invented': f'{row["invented"]} of {clean["tn"]}',
+    } for row in found['attacks']]
 
 
 def _headline_without_labels(summary: Mapping[str, Any]) -> str:

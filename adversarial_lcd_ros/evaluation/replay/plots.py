@@ -7,14 +7,16 @@ from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.evaluation.page import CLEAN_COLOUR, GRID, STYLE, attack_colour, svg
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
-from adversarial_lcd_ros.evaluation.replay.summary import run_metrics
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
+# In equal steps of log odds.
+THRESHOLDS = 1 / (1 + np.exp(-np.linspace(-7, 7, 281)))
 _LOOP_SHADE, _NEW_SHADE = '#dcebd9', '#e9e9ee'
 _ROW_HEIGHT = 1.7
 _Y_LIMITS = (-0.03, 1.15)  # above 1 is room for the marks
@@ -24,11 +26,13 @@ _DOWN, _UP = ('suppressed', 'diverted', 'silenced', 'redirected'), ('invented', 
 Run = tuple[str, Sequence[QueryRecord]]
 
 
-def precision_recall(clean: Sequence[QueryRecord], attacks: Sequence[Run]) -> bytes | None:
+def decline_over_threshold(clean: Sequence[QueryRecord], attacks: Sequence[Run],
+                           threshold: float) -> bytes | None:
     """
-    Draw precision over recall before and after each attack; None without positives.
+    Draw what each attack takes from balanced accuracy by threshold; None if a class is empty.
 
-    A dot marks what the detector's own threshold gives.
+    The same probabilities, held against other thresholds than the detector's; the attacks did
+    their best against that one. Probabilities lie so near to 0 and 1 that the axis is in log odds.
 
     Parameters
     ----------
@@ -36,29 +40,41 @@ def precision_recall(clean: Sequence[QueryRecord], attacks: Sequence[Run]) -> by
         Records of the clean run.
     attacks : sequence of (title, records)
         Attacked runs in the order of the tables.
+    threshold : float
+        The detector's.
 
     """
-    runs = [('before', CLEAN_COLOUR, clean)]
-    runs += [(title, attack_colour(index), run) for index, (title, run) in enumerate(attacks)]
-    measured = [(title, colour, run_metrics(run)) for title, colour, run in runs]
+    before = _balanced_accuracies(clean)
+    if not attacks or np.isnan(before).any():
+        return None
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.9, 3.7), layout='constrained')
+        figure = Figure(figsize=(5.6, 3.7), layout='constrained')
         axes = figure.subplots()
-        for title, colour, metrics in measured:
-            curve = metrics.curve
-            if curve is None:
-                return None
-            # The step to the left of each threshold keeps its precision.
-            axes.step(np.r_[curve.recall, 0.0], np.r_[curve.precision, curve.precision[-1:]],
-                      where='pre', color=colour, linewidth=1.6,
-                      label=f'{title} (AP {metrics.average_precision:.3f})')
-            if metrics.precision is not None and metrics.recall is not None:
-                axes.plot(metrics.recall, metrics.precision, 'o', color=colour, markersize=5,
-                          markeredgecolor='white', clip_on=False, zorder=3)
-        axes.set(xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.03))
+        axes.axhline(0, color=GRID, linewidth=1.0)
+        axes.axvline(threshold, color='#9aa0a8', linewidth=0.8, linestyle=(0, (4, 3)))
+        for index, (title, run) in enumerate(attacks):
+            axes.plot(THRESHOLDS, 100 * (before - _balanced_accuracies(run)), linewidth=1.6,
+                      color=attack_colour(index), label=title)
+        axes.set(xlabel="threshold (dashed: the detector's)", ylabel='decline, points',
+                 xscale='logit', xlim=(THRESHOLDS[0], THRESHOLDS[-1]))
+        axes.xaxis.set_major_locator(FixedLocator([0.001, 0.01, 0.1, 0.5, 0.9, 0.99, 0.999]))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
+        axes.xaxis.set_minor_locator(NullLocator())
         axes.grid(color=GRID, linewidth=0.6)
-        axes.legend(loc='lower left', fontsize=8.0)
+        figure.legend(loc='outside upper left', fontsize=8.0)
         return svg(figure)
+
+
+def _balanced_accuracies(run: Sequence[QueryRecord]) -> NDArray[np.float64]:
+    """Return balanced accuracy at each of THRESHOLDS; nan if a class is empty."""
+    kind, probability = column(run, 'label'), column(run, 'probability').astype(np.float64)
+    declared = probability >= THRESHOLDS[:, None]
+    loop, new = kind == POSITIVE, kind == NEGATIVE
+    if not (loop.any() and new.any()):
+        return np.full(len(THRESHOLDS), np.nan)
+    found = declared & column(run, 'match_correct').astype(bool)
+    balanced: NDArray[np.float64] = (found[:, loop].mean(1) + 1 - declared[:, new].mean(1)) / 2
+    return balanced
 
 
 def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: float,
@@ -73,7 +89,7 @@ def timeline(clean: Sequence[QueryRecord], attacks: Sequence[Run], threshold: fl
     Parameters
     ----------
     clean, attacks
-        As for ``precision_recall``.
+        As for ``decline_over_threshold``.
     threshold : float
         The detector's.
     width : float

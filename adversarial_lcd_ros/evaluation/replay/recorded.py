@@ -13,9 +13,10 @@ import numpy as np
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
-from adversarial_lcd_ros.evaluation.replay.records import AttackRun, make_records
+from adversarial_lcd_ros.evaluation.replay.records import CLEAN, AttackRun, make_records
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
@@ -44,7 +45,7 @@ from adversarial_lcd_ros.sequences.replay import read_payloads
 
 # The run of the attacker that was recorded, whose settings nobody recorded.
 RECORDED = 'recorded'
-_CLEAN, _GRAPHS, _DECISIONS, _REPORTS = 'graph_clean', 'graph', 'loop_closures', 'attack_report'
+_BEFORE, _GRAPHS, _DECISIONS, _REPORTS = 'graph_clean', 'graph', 'loop_closures', 'attack_report'
 MessageT = TypeVar('MessageT', MultiTierGraph, LoopClosure, AttackReport)
 
 
@@ -74,7 +75,7 @@ def is_recording(path: Path) -> bool:
     if not is_bag(path):
         return False
     with BagFile(path) as bag:
-        return {_CLEAN, _GRAPHS, _DECISIONS} <= set(_topics(bag))
+        return {_BEFORE, _GRAPHS, _DECISIONS} <= set(_topics(bag))
 
 
 def _topics(bag: BagFile) -> dict[str, str]:
@@ -99,7 +100,7 @@ def read_recording(path: Path) -> Heard:
     """
     with BagFile(path) as bag:
         topics = _topics(bag)
-    clean = _by_stamp(path, topics[_CLEAN], decode_graph)
+    clean = _by_stamp(path, topics[_BEFORE], decode_graph)
     forwarded = _by_stamp(path, topics[_GRAPHS], decode_graph)
     decisions = _by_stamp(path, topics[_DECISIONS], decode_loop_closure)
     reports = (_by_stamp(path, topics[_REPORTS], decode_attack_report) if _REPORTS in topics
@@ -193,13 +194,14 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
              if sequence.trajectory is None else
              label_graphs(run.clean, sequence.trajectory, sequence.source, labels))
     records = make_records(found, clean, {RECORDED: AttackRun(run.decisions, run.reports)})
+    records = ask_check(records, {CLEAN: run.clean, RECORDED: run.forwarded}, lcd)
     if not heard.has_reports:
         records = [replace(record, status=None, edit_budget=None, query_budget=None, queries=None,
                            loss_before=None, loss_after=None, duration_s=None, reason=None)
                    for record in records]
     summary = summarise(sequence.name, records, {RECORDED: None}, GraphStatistics.of(
         [graph.node_count for graph in run.clean], [graph.edge_count for graph in run.clean]),
-        seed)
+        seed, lcd)
     summary['notes'] = notes
     summary['duration_s'] = time.monotonic() - started_s
     folder = ResultsFolder.create(output)

@@ -62,6 +62,9 @@ class QueryRecord:
         without ground truth what ``decision_change`` says.
     status, reason, edit_budget, edits, query_budget, queries, loss_before, loss_after, duration_s
         The attacker's report; None in the clean run.
+    support : float or None
+        How far a geometric check bears the declared loop out, 1: it stands; None if none is
+        declared or nobody asked.
 
     """
 
@@ -86,6 +89,7 @@ class QueryRecord:
     loss_before: float | None = None
     loss_after: float | None = None
     duration_s: float | None = None
+    support: float | None = None
 
     @property
     def label(self) -> int:

@@ -109,11 +109,15 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
     clean = runs[CLEAN]
     attacks = [(wording.attack_title(attack), runs[attack['name']])
                for attack in summary['attacks']]
-    curve = plots.precision_recall(clean, attacks)
-    threshold = _threshold(configuration)
+    detector = _detector_values(configuration)
+    threshold = float(detector['threshold'])
+    curve = plots.decline_over_threshold(clean, attacks, threshold)
     values = {
         'summary': summary, 'strongest': wording.strongest(summary), 'wording': wording,
         'headline': wording.headline(summary),
+        'detector': wording.detector_title(summary.get('detector')),
+        'meaning': wording.meaning(summary), 'behind_rows': wording.behind_rows(summary),
+        'check': detector,
         'labelled': wording.is_labelled(summary),
         'decline_rows': wording.decline_rows(summary),
         'figure_rows': wording.figure_rows(summary),
@@ -132,13 +136,14 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
     return path
 
 
-def _threshold(configuration: Mapping[str, Any]) -> float:
+def _detector_values(configuration: Mapping[str, Any]) -> Mapping[str, Any]:
     # A results folder always holds the detector's settings; the first section is the clean run's.
     for section in configuration['settings']:
         if section['section'] == LcdConfig.title:
-            return float(section['values']['threshold'])
-    raise EvaluationError(f'{CONFIGURATION} has no section {LcdConfig.title!r}: the threshold of '
-                          'the detector is unknown')
+            values: Mapping[str, Any] = section['values']
+            return values
+    raise EvaluationError(f'{CONFIGURATION} has no section {LcdConfig.title!r}: the settings of '
+                          'the detector are unknown')
 
 
 def _sample(summary: Mapping[str, Any]) -> list[tuple[str, int, float]]:

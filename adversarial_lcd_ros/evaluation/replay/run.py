@@ -29,6 +29,7 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
 from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
 from adversarial_lcd_ros.evaluation.replay.processes import (
@@ -171,9 +172,11 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
     labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
+    records = ask_check(records, {CLEAN: clean.clean, **{
+        name: run.forwarded for name, run in runs.items()}}, plan.lcd)
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
         [graph.node_count for graph in clean.clean],
-        [graph.edge_count for graph in clean.clean]), plan.seed)
+        [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:

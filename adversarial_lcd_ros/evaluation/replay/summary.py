@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.methods import attack_columns
@@ -22,6 +22,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
     measure,
     right,
 )
+from adversarial_lcd_ros.evaluation.replay.behind import behind_check
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     NO_TRUTH,
@@ -31,6 +32,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     runs_of,
 )
 from adversarial_lcd_ros.evaluation.results import summary_document
+from adversarial_lcd_ros.lcd.defences import defence_names
 
 KIND, SCHEMA = 'replay', 2
 # What nobody can count without ground truth.
@@ -57,6 +59,7 @@ class GraphStatistics:
 
 def summarise(sequence: str, records: Sequence[QueryRecord],
               attacks: Mapping[str, AttackConfig | None], graphs: GraphStatistics, seed: int,
+              lcd: LcdConfig | None = None,
               block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
     """
     Return the figures of an evaluation (``as_document``: summary.json); undefined ones are None.
@@ -73,6 +76,8 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
         Of the clean run.
     seed : int
         Of the whole evaluation; also seeds the bootstrap.
+    lcd : LcdConfig, optional
+        Of the detector, to be named beside its figures.
     block_s : float
         Length of the bootstrap's blocks, seconds.
 
@@ -100,10 +105,38 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
         'clean': _run_figures(clean, block, seed),
         'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
                     for name, run in runs.items()],
+        'detector': None if lcd is None else detector_facts(lcd),
+        'behind_check': _behind_check(attacks, clean, runs, block, seed),
         'notes': [], 'seed': seed,
         'bootstrap': {'block_s': block_s, 'block_frames': block, 'blocks': len(clean) / block,
                       'replicates': intervals.REPLICATES, 'level': intervals.LEVEL}}
     return summary if summary['labelled'] else _without_labels(summary)
+
+
+def detector_facts(lcd: LcdConfig) -> dict[str, Any]:
+    """Return what has to be known of a detector wherever its figures are quoted."""
+    return {'target': lcd.target, 'threshold': lcd.threshold, 'defences': defence_names(lcd)}
+
+
+def _behind_check(attacks: Mapping[str, AttackConfig | None], clean: Sequence[QueryRecord],
+                  runs: Mapping[str, Sequence[QueryRecord]], block: int,
+                  seed: int) -> dict[str, Any] | None:
+    """Return the figures with a geometric check behind the detector; None if it was not asked."""
+    if not any(record.support is not None for record in clean):
+        return None
+    before = behind_check(clean)
+    rows = [{'name': name, **_decline(before, behind_check(run), block, seed)}
+            for name, run in runs.items()]
+    return {'clean': run_metrics(before).as_dict(), 'attacks': rows}
+
+
+def _decline(clean: Sequence[QueryRecord], run: Sequence[QueryRecord], block: int,
+             seed: int) -> dict[str, Any]:
+    """Return what a run lost against the clean one."""
+    kind, before, after = column(clean, 'label'), column(clean, 'outcome'), column(run, 'outcome')
+    return {**run_metrics(run).as_dict(), **asdict(effect(kind, before, after)),
+            'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
+                                                        seed)}
 
 
 def _without_labels(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -111,7 +144,7 @@ def _without_labels(summary: Mapping[str, Any]) -> dict[str, Any]:
     def unknown(figures: Mapping[str, Any]) -> dict[str, Any]:
         return {name: None if name in _NEED_LABELS else value for name, value in figures.items()}
 
-    return {**unknown(summary), 'clean': unknown(summary['clean']),
+    return {**unknown(summary), 'clean': unknown(summary['clean']), 'behind_check': None,
             'attacks': [unknown(attack) for attack in summary['attacks']]}
 
 
