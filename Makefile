@@ -103,8 +103,8 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	  $(LOCKED) requirements/$$lock.txt
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
-	@for node in $(NODES); do \
-	  ln -sf ../../bin/$$node $(VENV)/lib/adversarial_lcd_ros/$$node; done
+	@for name in adversarial-lcd $(NODES); do \
+	  ln -sf ../../bin/$$name $(VENV)/lib/adversarial_lcd_ros/$$name; done
 	@touch $@
 
 $(BENCHABLE): $(INSTALLED) requirements/bench.txt
