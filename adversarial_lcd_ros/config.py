@@ -414,3 +414,5 @@ class BagReplayNodeConfig(Config):
     record: str = setting(
         '', 'Bag (MCAP) to write the graphs, decisions and attack reports of this replay to; '
         'empty: none.')
+    record_frames: bool = setting(
+        True, 'Record what is replayed, too: camera frames, poses, detections.')
