@@ -5,7 +5,7 @@
 # make soak: an hour of faults (ARGS='--only messages'); docs/reliability.md tells what came of it
 # make lock, make licences: renew requirements/ and docs/licences.md
 #
-# The first target sets up .venv (releases and digests: requirements/) and the object model; after
+# The first target sets up .venv (releases and digests: requirements/; 1.6 GB on disk); after
 # that nothing is downloaded or built.
 # ARGS are passed on: make demo ARGS='--ratio 1e-4'; make test ARGS='-k codec'
 

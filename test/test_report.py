@@ -1,19 +1,18 @@
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from html.parser import HTMLParser
-import io
 import json
 
 import numpy as np
 import pytest
-from rich.console import Console
 
+from adversarial_lcd_ros.commands.common import print_lines
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import results, wording
 from adversarial_lcd_ros.evaluation.pictures import Picture
-from adversarial_lcd_ros.evaluation.replay import report, tables
+from adversarial_lcd_ros.evaluation.replay import report
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
@@ -23,6 +22,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.terminal import replay_lines
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
@@ -243,12 +243,21 @@ def test_headline_is_careful(summary):
     assert wording.headline(nothing).startswith('No attack lowered')
 
 
-def test_terminal_tables(summary):
-    console = Console(width=200, record=True, file=io.StringIO())
-    console.print(tables.decline_table(summary))
-    console.print(tables.figure_table(summary))
-    shown = console.export_text()
-    assert all(attack['name'] in shown for attack in summary['attacks'])
+@pytest.mark.parametrize('width', [80, 120])
+def test_the_terminal_has_a_line_for_each_attack(summary, width, monkeypatch, capsys):
+    monkeypatch.setenv('COLUMNS', str(width))
+    longer = {**summary['attacks'][0], 'name': 'eigencentrality + SVM-RBF, no queries at all'}
+    title, rows = replay_lines({**summary, 'attacks': [*summary['attacks'], longer]})
+    print_lines(title, rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= width
+    assert len(lines) == 2 + len(rows)
+    for line, row in zip(lines[2:], rows, strict=True):
+        # Names give way, figures do not.
+        *_, decline = row.values()
+        assert line.rstrip().endswith(decline)
+        assert line.startswith(row['attack'][:9])
+        assert row['attack'][-8:] in line
 
 
 def test_an_attack_without_a_name_is_told_by_its_settings(summary):
@@ -361,9 +370,9 @@ def test_the_report_without_ground_truth_says_what_is_missing(bare, bare_records
     for unsaid in ('None', 'a new place', 'Decline', 'block bootstrap'):
         assert unsaid not in page
     assert report.report_folder(folder.path).read_text() == page
-    console = Console(file=io.StringIO(), width=150)
-    console.print(tables.decline_table(bare), tables.figure_table(bare))
-    assert 'success rate' in console.file.getvalue()
+    title, rows = replay_lines(bare)
+    assert 'no ground truth' in title
+    assert rows[0]['changed'] == '7'
 
 
 def test_pictures_without_ground_truth_show_what_changed(bare_records):

@@ -8,7 +8,7 @@ from typing import Any
 
 from adversarial_lcd_ros.attack.search import COMMON_SETTINGS
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.registry import PERTURBATIONS, SEARCHES, SURROGATES, YARDSTICKS
+from adversarial_lcd_ros.registry import NONE, PERTURBATIONS, SEARCHES, SURROGATES, YARDSTICKS
 from adversarial_lcd_ros.shown import Shown
 
 # Columns of a row that say what ran; '' where a search has no such thing.
@@ -48,6 +48,29 @@ def method_facts(method: str) -> type[Shown]:
 def surrogate_facts(surrogate: str) -> type[Shown]:
     """Return the class of a surrogate, for its facts."""
     return _facts(surrogate, SURROGATES)
+
+
+def whose(row: Mapping[str, Any]) -> str:
+    """
+    Return whose an attack is: paper, ours, other, control, or bound; '' where nobody knows.
+
+    'bound' looks into the detector and is no attack that anybody could carry out. 'other' is from
+    elsewhere in the literature, or of the user's own.
+    """
+    if row['mode'] == 'pass':
+        return 'control'
+    if not row['search']:
+        return ''
+    if is_yardstick(row):
+        return 'bound'
+    method, surrogate = method_of(row), row['surrogate']
+    if method == 'random_flip' and surrogate in ('', NONE):
+        return 'control'
+    ranks = [method_facts(method).rank] + (
+        [] if surrogate in ('', NONE) else [surrogate_facts(surrogate).rank])
+    if max(ranks) >= 100:
+        return 'ours'
+    return 'paper' if max(ranks) < Shown.rank else 'other'
 
 
 def _facts(name: str, *tables: Any) -> type[Shown]:
