@@ -45,6 +45,7 @@ NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
     'lcd': (LcdConfig, LcdNodeConfig, MessageLimits),
     'attacker': (AttackConfig, AttackerNodeConfig, MessageLimits),
     'bag_replay': (ReplayConfig, BagReplayNodeConfig),
+    'viewer': (MessageLimits,),
 }
 # The sections of a settings file.
 SECTIONS: Mapping[str, tuple[type[Config], ...]] = {**NODE_CONFIGS, 'labels': (LabelConfig,)}

@@ -197,5 +197,10 @@ def lcd() -> int:
     return run_node_process('lcd')
 
 
+def viewer() -> int:
+    """Be the node viewer."""
+    return run_node_process('viewer')
+
+
 # What is registered first runs last, when all others have cleaned up.
 atexit.register(_leave)

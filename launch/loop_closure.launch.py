@@ -47,11 +47,12 @@ PARAMETERS = {
                    'stride': int, 'start_s': float, 'duration_s': float, 'loop': int,
                    'clock': boolean, 'record': str},
 }
-CHOICES = {'attack': [*BOOLEANS], 'use_sim_time': [*BOOLEANS]} | {
+CHOICES = {'attack': [*BOOLEANS], 'view': [*BOOLEANS], 'use_sim_time': [*BOOLEANS]} | {
     name: ['', *BOOLEANS] for taken in PARAMETERS.values() for name, read in taken.items()
     if read is boolean}
 ARGUMENTS = {
     'attack': ('false', 'Put the attacker between graph_builder and lcd.'),
+    'view': ('false', 'Draw a picture of each decision on view/compressed.'),
     'image': ('image', 'Camera topic; compressed frames on <image>/compressed.'),
     'params_file': (str(SHARE / 'config' / 'params.yaml'), 'Parameters of the nodes.'),
     'namespace': ('', 'Namespace of nodes and topics.'),
@@ -65,13 +66,15 @@ def start(context):
     """Return the actions that start the nodes with the arguments given."""
     given = context.launch_configurations
     attack, frames = BOOLEANS[given['attack']], given['image']
-    remappings = {'graph_builder': [('image', frames),
-                                    ('image/compressed', f'{frames}/compressed')]}
+    camera = [('image', frames), ('image/compressed', f'{frames}/compressed')]
+    remappings = {'graph_builder': [*camera], 'viewer': camera}
     nodes = ['lcd', 'graph_builder']
     if attack:
         # The builder's graphs reach the detector through the man in the middle only.
         remappings['graph_builder'].append(('graph', 'graph_clean'))
         nodes.append('attacker')
+    if BOOLEANS[given['view']]:
+        nodes.append('viewer')
     if given['bag']:
         nodes.append('bag_replay')
     profile = given['dds_profile'] and found(given['dds_profile'])
@@ -84,7 +87,7 @@ def start_node(name, given, remappings):
     """Return the action that starts one node; its end, also a failure, ends the pipeline."""
     parameters = {'use_sim_time': BOOLEANS[given['use_sim_time']]}
     parameters |= {parameter: read(given[parameter])
-                   for parameter, read in PARAMETERS[name].items() if given[parameter]}
+                   for parameter, read in PARAMETERS.get(name, {}).items() if given[parameter]}
     return Node(package=PACKAGE, executable=name, name=name, namespace=given['namespace'],
                 parameters=[found(given['params_file']), parameters], remappings=remappings,
                 output='screen', on_exit=Shutdown(reason=f'{name} has ended'))

@@ -17,13 +17,13 @@ from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.recorded import is_recording, read_recording
 from adversarial_lcd_ros.graph_sequences.converting import VIEW_TOPIC, convert_recording
-from adversarial_lcd_ros.graph_sequences.views import verdict, why
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.bags import camera_topics
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
+from adversarial_lcd_ros.vision.views import verdict, why
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNT = 6

@@ -299,6 +299,13 @@ def test_launch_puts_the_attacker_between_builder_and_detector(launched):
         'use_sim_time': False, 'ratio': 1e-4, 'mode': 'pass'}
 
 
+def test_launch_lets_the_viewer_look_at_the_same_camera(launched):
+    nodes = launched(view='true', attack='true', image='/camera/image_raw')
+    assert nodes['viewer']['remappings'] == nodes['graph_builder']['remappings'][:2]
+    assert nodes['viewer']['parameters'][1] == {'use_sim_time': False}
+    assert 'viewer' not in launched()
+
+
 def test_launch_replays_a_bag_and_ends_with_it(launched):
     nodes = launched(bag='tour', lockstep='true', target='vbow', namespace='robot',
                      dds_profile='profile.xml')

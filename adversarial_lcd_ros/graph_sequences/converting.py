@@ -10,10 +10,8 @@ from typing import Any
 
 from adversarial_lcd_ros.errors import CodecError, SequenceError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.graph_sequences.views import Views
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import payload_of
-from adversarial_lcd_ros.messages.types import AttackReport
 from adversarial_lcd_ros.paths import PACKAGE
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagFile, BagWriter
@@ -23,6 +21,7 @@ from adversarial_lcd_ros.sequences.importing import image_message
 from adversarial_lcd_ros.sequences.inspection import identify_payload
 from adversarial_lcd_ros.sequences.replay import payload_schemas
 from adversarial_lcd_ros.sequences.sequence import Progress
+from adversarial_lcd_ros.vision.views import Views
 
 VIEW_TOPIC = '/view/compressed'
 # Message to what reads it, of this and of earlier versions, and what writes it.
@@ -91,8 +90,7 @@ def convert_recording(source: Path, destination: Path, frames: Path | None = Non
             raise SequenceError(f'{source} is no recording of the nodes: expected graphs or '
                                 f'decisions, found {", ".join(sorted(bag.topics)) or "nothing"}')
         cameras = camera_topics(bag)
-        views = Views(attacked=any(_name(topic) == 'graph_clean' for topic in payloads),
-                      reports=_reports(bag, payloads))
+        views = Views(attacked={'graph_clean', 'attack_report'} <= set(map(_name, payloads)))
     pictures = _Pictures(None if frames is None and not cameras else
                          source if frames is None else frames)
     with BagWriter(destination, overwrite=overwrite) as writer:
@@ -106,19 +104,6 @@ def convert_recording(source: Path, destination: Path, frames: Path | None = Non
 
 def _name(topic: str) -> str:
     return topic.rsplit('/', 1)[-1]
-
-
-def _reports(bag: BagFile, payloads: Mapping[str, str]) -> dict[int, AttackReport]:
-    """Return the attack reports of a recording that can be read, by stamp."""
-    found = {}
-    for topic, _, wire in bag.messages([topic for topic, message in payloads.items()
-                                        if message == 'AttackReport']):
-        try:
-            report = codec.decode_attack_report(payload_of(bag.topics[topic], wire))
-        except CodecError:
-            continue
-        found[report.stamp_ns] = report
-    return found
 
 
 def _message_of(bag: BagFile, topic: str) -> str:
@@ -216,6 +201,8 @@ class _Work:
             return self._views.note_clean(content)
         if name == 'graph':
             return self._views.note_graph(content)
+        if name == 'attack_report':
+            return self._views.note_report(content)
         return self._views.note_decision(content) if name == 'loop_closures' else None
 
     def notes(self) -> list[str]:

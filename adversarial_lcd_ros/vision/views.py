@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
 from typing import TypeVar
 
 import cv2
@@ -27,20 +26,19 @@ class Views:
     """
     Makes a picture of each decision once all that belongs to it is there, in whatever order.
 
-    Graphs and decisions wait for each other, a limited number of them; pictures of frames stay
-    for later matches, 256 MB at most.
+    Graphs, reports and decisions wait for each other, a limited number of them; pictures of
+    frames stay for later matches, 256 MB at most.
 
-    Parameters
+    Attributes
     ----------
     attacked : bool
-        Whether there are clean graphs beside those that the detector got.
-    reports : mapping of int to AttackReport
-        What the attacker said, by stamp.
+        There are clean graphs and reports, too: a picture waits for them.
 
     """
 
-    def __init__(self, *, attacked: bool, reports: Mapping[int, AttackReport]) -> None:
-        self._attacked, self._reports = attacked, reports
+    def __init__(self, *, attacked: bool = False) -> None:
+        self.attacked = attacked
+        self._reports: OrderedDict[int, AttackReport] = OrderedDict()
         self._pictures: OrderedDict[int, bytes] = OrderedDict()
         self._bytes = 0
         self._clean: OrderedDict[int, MultiTierGraph] = OrderedDict()
@@ -65,6 +63,11 @@ class Views:
         _keep(self._heard, graph.stamp_ns, graph)
         return self._drawn(graph.stamp_ns)
 
+    def note_report(self, report: AttackReport) -> Frame | None:
+        """Take what the attacker says of a graph; return what is complete now."""
+        _keep(self._reports, report.stamp_ns, report)
+        return self._drawn(report.stamp_ns)
+
     def note_decision(self, decision: LoopClosure) -> Frame | None:
         """Take a decision; return what is complete now."""
         _keep(self._decisions, decision.stamp_ns, decision)
@@ -73,17 +76,19 @@ class Views:
     def _drawn(self, stamp_ns: int) -> Frame | None:
         """Return the picture of a decision, a JPEG; None where something of it is missing."""
         graph, decision = self._heard.get(stamp_ns), self._decisions.get(stamp_ns)
-        clean, query = self._clean.get(stamp_ns), self._picture(stamp_ns)
-        if graph is None or decision is None or query is None or (
-                self._attacked and clean is None):
+        clean, report = self._clean.get(stamp_ns), self._reports.get(stamp_ns)
+        if graph is None or decision is None or stamp_ns not in self._pictures or (
+                self.attacked and (clean is None or report is None)):
             return None
-        for kept in (self._heard, self._decisions, self._clean):
+        for kept in (self._heard, self._decisions, self._clean, self._reports):
             kept.pop(stamp_ns, None)
+        query = self._picture(stamp_ns)
+        assert query is not None
         try:
             flips = None if clean is None else clean.flips_to(graph)
             drawn = draw_decision(
                 query, graph, flips, self._picture(decision.match_stamp_ns), verdict(decision),
-                why(decision, clean, graph, self._reports.get(stamp_ns)),
+                why(decision, clean, graph, report),
                 is_loop=decision.is_loop)
         except GraphError:  # of images of another size, or of a clean graph of other nodes
             return None
