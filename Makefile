@@ -5,7 +5,7 @@
 # make soak: an hour of faults (ARGS='--only messages'); docs/reliability.md tells what came of it
 # make lock, make licences: renew requirements/ and docs/licences.md
 #
-# The first target sets up .venv (releases and digests: requirements/) and the object model; after
+# The first target sets up .venv (releases and digests: requirements/; 1.6 GB on disk); after
 # that nothing is downloaded or built.
 # ARGS are passed on: make demo ARGS='--ratio 1e-4'; make test ARGS='-k codec'
 
@@ -21,7 +21,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
 COMPILED := $(VENV)/.compiled
-NODES := attacker bag_replay graph_builder lcd
+NODES := attacker bag_replay graph_builder lcd viewer
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 # Every release by its digest, from a lock that is complete. What comes as source is built by the
 # setuptools of the lock, too.
@@ -103,8 +103,8 @@ $(INSTALLED): setup.py setup.cfg pyproject.toml requirements/test.txt requiremen
 	  $(LOCKED) requirements/$$lock.txt
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@mkdir -p $(VENV)/lib/adversarial_lcd_ros
-	@for node in $(NODES); do \
-	  ln -sf ../../bin/$$node $(VENV)/lib/adversarial_lcd_ros/$$node; done
+	@for name in adversarial-lcd $(NODES); do \
+	  ln -sf ../../bin/$$name $(VENV)/lib/adversarial_lcd_ros/$$name; done
 	@touch $@
 
 $(BENCHABLE): $(INSTALLED) requirements/bench.txt

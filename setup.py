@@ -18,7 +18,9 @@ except ImportError:  # before setuptools 70.1
         bdist_wheel = None
 
 PACKAGE = 'adversarial_lcd_ros'
-NODES = ('attacker', 'bag_replay', 'graph_builder', 'lcd')
+NODES = ('attacker', 'bag_replay', 'graph_builder', 'lcd', 'viewer')
+# Executable to the module and function that it calls.
+EXECUTABLES = {'adversarial-lcd': 'cli:main', **{node: f'start:{node}' for node in NODES}}
 SHARED_FOLDERS = ('launch', 'config', 'msg_schemas', 'bags')
 
 # sh runs the lines up to exec; to Python they are a string. Unlike the scripts that pip writes,
@@ -34,9 +36,9 @@ exec "$python" "$self" "$@"
 '''
 import sys
 
-from {package}.start import {node}
+from {package}.{module} import {function}
 
-sys.exit({node}())
+sys.exit({function}())
 """
 
 
@@ -52,19 +54,21 @@ def shared_files():
 
 
 def write_wrappers(folder):
-    """Write an executable for each node into a folder, and return their paths."""
+    """Write the executables into a folder, and return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
-    for node in NODES:
-        path = folder / node
-        path.write_text(WRAPPER.format(package=PACKAGE, node=node), encoding='utf-8')
+    for name, called in EXECUTABLES.items():
+        module, _, function = called.partition(':')
+        path = folder / name
+        path.write_text(WRAPPER.format(package=PACKAGE, module=module, function=function),
+                        encoding='utf-8')
         path.chmod(0o755)
-    return [str(folder / node) for node in NODES]
+    return [str(folder / name) for name in EXECUTABLES]
 
 
 commands = {}
 if bdist_wheel is not None:
     class WheelWithExecutables(bdist_wheel):
-        """A wheel with lib/adversarial_lcd_ros/<node>, which colcon makes from entry points."""
+        """A wheel with lib/adversarial_lcd_ros/<name>, which colcon makes from entry points."""
 
         def run(self):
             """Add the executables to the data files, and build the wheel."""

@@ -51,15 +51,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    from adversarial_lcd_ros.commands.parser import make_parser
+    from adversarial_lcd_ros.commands.common import be_quiet
+    from adversarial_lcd_ros.commands.parser import complete, make_parser
+    from adversarial_lcd_ros.settings import with_options
 
     write_plainly()
-    options = make_parser().parse_args(argv)
+    parser = make_parser()
+    complete(parser)
+    options = parser.parse_args(argv)
+    be_quiet(options.quiet)
     try:
         options.run(options)
         sys.stdout.flush()  # here, where a full disk can still be said
     except AdversarialLcdError as error:
-        return _refuse(str(error))
+        return _refuse(with_options(str(error), options))
     except BrokenPipeError:
         # Whoever read our output has enough of it; nothing more can be written, also at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

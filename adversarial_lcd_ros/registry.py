@@ -17,7 +17,7 @@ from importlib.metadata import entry_points
 from inspect import isabstract
 from typing import Any
 
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 
 _PACKAGE = 'adversarial_lcd_ros'
 NONE = 'none'
@@ -113,8 +113,9 @@ class Table:
         if name in self.moved:
             raise ConfigError(f'{name!r} is no {self.noun}: {self.moved[name]}')
         own = (', or one of your own as package.module:Class' if self.group else '')
-        raise ConfigError(f'no {self.noun} {name!r}; there are: '
-                          f'{", ".join([*self.entries, *(entry.name for entry in there)])}{own}')
+        names = [*self.entries, *(entry.name for entry in there)]
+        raise ConfigError(f'no {self.noun} {with_suggestions([repr(name)], map(repr, names))}; '
+                          f'there are: {", ".join(names)}{own}')
 
 
 @lru_cache(256)

@@ -14,6 +14,7 @@ from argparse import SUPPRESS, ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Iterator, Mapping
 from dataclasses import Field, fields
 from pathlib import Path
+import re
 import textwrap
 from typing import Any
 
@@ -33,7 +34,7 @@ from adversarial_lcd_ros.config import (
     MessageLimits,
     ReplayConfig,
 )
-from adversarial_lcd_ros.errors import ConfigError, FileError
+from adversarial_lcd_ros.errors import ConfigError, FileError, with_suggestions
 from adversarial_lcd_ros.files.reading import read_yaml
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.registry import Table
@@ -44,6 +45,7 @@ NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
     'lcd': (LcdConfig, LcdNodeConfig, MessageLimits),
     'attacker': (AttackConfig, AttackerNodeConfig, MessageLimits),
     'bag_replay': (ReplayConfig, BagReplayNodeConfig),
+    'viewer': (MessageLimits,),
 }
 # The sections of a settings file.
 SECTIONS: Mapping[str, tuple[type[Config], ...]] = {**NODE_CONFIGS, 'labels': (LabelConfig,)}
@@ -54,6 +56,8 @@ _TRAINED: Mapping[type[Config], tuple[str, str]] = {
     AttackConfig: ('surrogate_data', SURROGATE_DATA)}
 
 _ANY_NAMESPACE = '/**/'
+# Behind a class and a dot: what its options start with. No setting has this name.
+_PREFIX = '(prefix)'
 _HEADER = """\
 # Parameters of the nodes with their defaults, made by "adversarial-lcd params".
 # Nodes: --ros-args --params-file FILE. Commands: --config FILE, which also takes a section
@@ -126,7 +130,8 @@ def load_settings(path: Path) -> dict[str, dict[str, Any]]:
 
 def _section(path: Path, section: str, values: Any) -> dict[str, Any]:
     if section not in SECTIONS:
-        raise ConfigError(f'settings file {path}: unknown section {section!r}; there are: '
+        raise ConfigError(f'settings file {path}: unknown section '
+                          f'{with_suggestions([section], SECTIONS)}; there are: '
                           f'{", ".join(SECTIONS)}')
     if isinstance(values, dict) and set(values) == {'ros__parameters'}:
         values = values['ros__parameters']
@@ -139,7 +144,8 @@ def _section(path: Path, section: str, values: Any) -> dict[str, Any]:
     unknown = sorted(str(name) for name in values if name not in known)
     if unknown:
         raise ConfigError(f'settings file {path}, {section}: unknown setting '
-                          f'{", ".join(unknown)}; there are: {", ".join(sorted(known))}')
+                          f'{with_suggestions(unknown, sorted(known))}; there are: '
+                          f'{", ".join(sorted(known))}')
     return values
 
 
@@ -157,6 +163,7 @@ def add_config_options(parser: ArgumentParser, config_class: type[Config],
         Put before the names, where two classes of a command share some: ``--lcd-model``.
 
     """
+    parser.set_defaults(**{f'{config_class.__name__}.{_PREFIX}': prefix})
     group = parser.add_argument_group(f'settings of {config_class.title}')
     for entry in fields(config_class):
         flag = f'--{prefix}{entry.name}'.replace('_', '-')
@@ -190,6 +197,17 @@ def config_from_options(options: Namespace, config_class: type[ConfigT]) -> Conf
 
     """
     return config_class.from_mapping(chosen_settings(options, config_class))
+
+
+def with_options(text: str, options: Namespace) -> str:
+    """Return a text that calls settings of the command line by the options that gave them."""
+    for destination in vars(options):
+        owner, _, name = destination.partition('.')
+        if name and name != _PREFIX:
+            prefix = getattr(options, f'{owner}.{_PREFIX}', '')
+            option = f'--{prefix}{name}'.replace('_', '-')
+            text = re.sub(rf'\b{re.escape(destination)}\b', option, text)
+    return text
 
 
 def add_models_option(parser: ArgumentParser) -> None:

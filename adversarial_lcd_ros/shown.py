@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-# Where the ranks of what is not the paper's, of ours, and of yardsticks begin.
-OTHERS_RANK, OURS_RANK, YARDSTICK_RANK = 20, 100, 200
+# Where the ranks of what is not the paper's, and of ours, begin.
+OTHERS_RANK, OURS_RANK = 20, 100
 
 class Shown:
     """

@@ -24,9 +24,12 @@ EXIT_OK, EXIT_USAGE = 0, 2
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Process id of whoever started this node and waits for it, and where he reads how it is going.
 SUPERVISOR = 'ADVERSARIAL_LCD_SUPERVISOR'
+# Set where nothing but results, warnings and errors is to be said.
+QUIET = 'ADVERSARIAL_LCD_QUIET'
 _GRACE_S = 1.5
 _PR_SET_PDEATHSIG = 1
-_PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x'}
+_PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x',
+                             '…': '~'}
 _ERRORS = 'adversarial_lcd_plain'
 _interrupted: list[int] = []  # the exit code, once a signal came
 
@@ -192,6 +195,11 @@ def graph_builder() -> int:
 def lcd() -> int:
     """Be the node lcd."""
     return run_node_process('lcd')
+
+
+def viewer() -> int:
+    """Be the node viewer."""
+    return run_node_process('viewer')
 
 
 # What is registered first runs last, when all others have cleaned up.

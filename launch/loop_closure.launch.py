@@ -4,7 +4,8 @@ The pipeline: graph_builder and lcd, with a man in the middle if told so, and a 
     ros2 launch adversarial_lcd_ros loop_closure.launch.py image:=/camera/color/image_raw
     ros2 launch adversarial_lcd_ros loop_closure.launch.py bag:=bags/flat_tour attack:=true
 
-An argument wins over the parameter file, and the file over the defaults.
+An argument wins over the parameter file, and the file over the defaults. A path that is not there
+is looked for in the package's share folder, too: bags/flat_tour, config/fastdds.xml.
 """
 
 from pathlib import Path
@@ -19,22 +20,41 @@ from launch.actions import (
 from launch_ros.actions import Node
 
 PACKAGE = 'adversarial_lcd_ros'
-CONFIG = Path(__file__).resolve().parents[1] / 'config'
+SHARE = Path(__file__).resolve().parents[1]
 BOOLEANS = {'true': True, 'false': False}
-CHOICES = {'attack': [*BOOLEANS], 'use_sim_time': [*BOOLEANS], 'lockstep': ['', *BOOLEANS]}
+
+
+def boolean(text):
+    """Return what true or false means."""
+    return BOOLEANS[text]
+
+
+def found(path):
+    """Return a path as it is, or below the package's share folder where it is only there."""
+    shared = SHARE / path
+    return str(shared) if not Path(path).exists() and shared.exists() else path
+
 
 # What each node takes from an argument of the same name.
 PARAMETERS = {
-    'graph_builder': {'model': str},
-    'lcd': {'target': str, 'threshold': float},
+    'graph_builder': {'model': found, 'detector': str, 'detections': found, 'features': int,
+                      'queue_depth': int},
+    'lcd': {'target': str, 'threshold': float, 'defences': str, 'geometric_check': boolean,
+            'hard_answers': boolean},
     'attacker': {'mode': str, 'search': str, 'perturbation': str, 'surrogate': str,
-                 'ratio': float},
-    'bag_replay': {'bag': str, 'lockstep': BOOLEANS.__getitem__, 'rate': float, 'record': str},
+                 'ratio': float, 'max_queries': int, 'deadline_ms': float, 'seed': int},
+    'bag_replay': {'bag': found, 'lockstep': boolean, 'window': int, 'rate': float,
+                   'stride': int, 'start_s': float, 'duration_s': float, 'loop': int,
+                   'clock': boolean, 'record': str},
 }
+CHOICES = {'attack': [*BOOLEANS], 'view': [*BOOLEANS], 'use_sim_time': [*BOOLEANS]} | {
+    name: ['', *BOOLEANS] for taken in PARAMETERS.values() for name, read in taken.items()
+    if read is boolean}
 ARGUMENTS = {
     'attack': ('false', 'Put the attacker between graph_builder and lcd.'),
+    'view': ('false', 'Draw a picture of each decision on view/compressed.'),
     'image': ('image', 'Camera topic; compressed frames on <image>/compressed.'),
-    'params_file': (str(CONFIG / 'params.yaml'), 'Parameters of the nodes.'),
+    'params_file': (str(SHARE / 'config' / 'params.yaml'), 'Parameters of the nodes.'),
     'namespace': ('', 'Namespace of nodes and topics.'),
     'use_sim_time': ('false', 'Take the time from /clock.'),
     'dds_profile': ('', 'Fast DDS profile. config/fastdds.xml: shared memory large enough for '
@@ -46,16 +66,18 @@ def start(context):
     """Return the actions that start the nodes with the arguments given."""
     given = context.launch_configurations
     attack, frames = BOOLEANS[given['attack']], given['image']
-    remappings = {'graph_builder': [('image', frames),
-                                    ('image/compressed', f'{frames}/compressed')]}
+    camera = [('image', frames), ('image/compressed', f'{frames}/compressed')]
+    remappings = {'graph_builder': [*camera], 'viewer': camera}
     nodes = ['lcd', 'graph_builder']
     if attack:
         # The builder's graphs reach the detector through the man in the middle only.
         remappings['graph_builder'].append(('graph', 'graph_clean'))
         nodes.append('attacker')
+    if BOOLEANS[given['view']]:
+        nodes.append('viewer')
     if given['bag']:
         nodes.append('bag_replay')
-    profile = given['dds_profile']
+    profile = given['dds_profile'] and found(given['dds_profile'])
     environment = ([SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', profile)]
                    if profile else [])
     return environment + [start_node(name, given, remappings.get(name, [])) for name in nodes]
@@ -65,9 +87,9 @@ def start_node(name, given, remappings):
     """Return the action that starts one node; its end, also a failure, ends the pipeline."""
     parameters = {'use_sim_time': BOOLEANS[given['use_sim_time']]}
     parameters |= {parameter: read(given[parameter])
-                   for parameter, read in PARAMETERS[name].items() if given[parameter]}
+                   for parameter, read in PARAMETERS.get(name, {}).items() if given[parameter]}
     return Node(package=PACKAGE, executable=name, name=name, namespace=given['namespace'],
-                parameters=[given['params_file'], parameters], remappings=remappings,
+                parameters=[found(given['params_file']), parameters], remappings=remappings,
                 output='screen', on_exit=Shutdown(reason=f'{name} has ended'))
 
 

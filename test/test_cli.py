@@ -1,6 +1,9 @@
 """The command: thin, errors in one line, exit codes."""
 
+import os
 import signal
+import subprocess
+import sys
 
 from graph_factory import make_graph
 import numpy as np
@@ -14,7 +17,7 @@ from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.settings import render_parameters
 
 COMMANDS = ('demo', 'import', 'evaluate', 'report', 'train', 'fetch-model', 'compile', 'clean',
-            'inspect', 'params')
+            'convert', 'inspect', 'params')
 
 
 def wire(payload):
@@ -96,7 +99,7 @@ def test_known_error_is_one_line_and_exit_code_2(tmp_path, capsys):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_ends_with_130(monkeypatch, capsys, number):
-    def interrupt(destination, progress):
+    def interrupt(destination, progress, anew):
         signal.raise_signal(number)
     monkeypatch.setattr('adversarial_lcd_ros.provision.fetch_object_model', interrupt)
     before = signal.getsignal(number)
@@ -163,3 +166,71 @@ def test_import_reports_what_it_wrote(tmp_path, capsys):
     assert main(command) == 2
     assert 'exists already' in capsys.readouterr().err
     assert main([*command, '--overwrite']) == 0
+
+
+@pytest.mark.parametrize(('arguments', 'meant'), [
+    (['evalute', 'bag'], 'there is no command evalute (did you mean evaluate?); there are: demo,'),
+    (['demo', '--retio', '1e-4'], 'unknown: --retio (did you mean --ratio?)'),
+    (['evaluate', 'bag', '--lcd-tresholt', '1'], '(did you mean --lcd-threshold?)'),
+    (['params', '--lcd-target', 'wl'], 'unknown: --lcd-target'),
+])
+def test_a_slip_of_the_pen_is_told_what_was_meant(arguments, meant, capsys):
+    with pytest.raises(SystemExit, match='2'):
+        main(arguments)
+    assert meant in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (['--ratio', '2'], 'error: --ratio = 2.0: '),
+    (['--lcd-threshold', '-1'], 'error: --lcd-threshold = -1.0: '),
+    (['--builder-features', '1'], 'error: --builder-features = 1: '),
+    (['--search', 'recal'], "'recal' (did you mean 'recall'?); there are: "),
+    (['--recipe', 'quik'], "error: no recipe 'quik' (did you mean 'quick'?); there are: "),
+])
+def test_errors_name_the_option(arguments, said, tmp_path, capsys):
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    assert main(['demo', '--output', str(tmp_path), *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('content', 'said'), [
+    ('lcd: {tresholt: 0.7}', 'unknown setting tresholt (did you mean threshold?); there are: '),
+    ('lcdd: {threshold: 0.7}', 'unknown section lcdd (did you mean lcd?); there are: ')])
+def test_settings_files_are_told_what_was_meant(content, said, tmp_path, capsys):
+    (tmp_path / 'settings.yaml').write_text(content)
+    assert main(['build', str(tmp_path), str(tmp_path / 'bag'), '--config',
+                 str(tmp_path / 'settings.yaml')]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_recipes_are_told_what_was_meant(tmp_path, capsys):
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    recipe = tmp_path / 'mine.yaml'
+    recipe.write_text('attacks: [{name: a, serch: recall}]')
+    assert main(['demo', '--output', str(tmp_path), '--recipe', str(recipe)]) == 2
+    assert 'serch (did you mean search?)' in capsys.readouterr().err
+
+
+def test_quiet_says_results_and_warnings_alone(tmp_path, capsys, monkeypatch):
+    from adversarial_lcd_ros.commands.common import progress_bar, tell
+    for options, said in ((['--quiet'], 'warning: b\n'), ([], 'a\nwarning: b\n')):
+        assert main(['params', *options]) == 0
+        assert capsys.readouterr().out == render_parameters()
+        tell('a')
+        tell('warning: b')
+        if options:
+            with progress_bar('c') as progress:
+                progress(1, 2)
+        assert capsys.readouterr().err == said
+
+
+def test_a_shell_is_told_how_to_go_on(tmp_path):
+    pytest.importorskip('argcomplete', reason='argcomplete is not installed')
+    answer = tmp_path / 'answer'
+    environment = {**os.environ, '_ARGCOMPLETE': '1', '_ARGCOMPLETE_SUPPRESS_SPACE': '1',
+                   '_ARGCOMPLETE_STDOUT_FILENAME': str(answer), '_ARGCOMPLETE_IFS': '\n'}
+    for line, expected in (('adversarial-lcd ev', 'evaluate'),
+                           ('adversarial-lcd convert --ov', '--overwrite')):
+        subprocess.run([sys.executable, '-m', 'adversarial_lcd_ros.cli'], check=True, env={
+            **environment, 'COMP_LINE': line, 'COMP_POINT': str(len(line))}, timeout=60)
+        assert answer.read_text().split('\n') == [expected]

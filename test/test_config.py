@@ -147,8 +147,8 @@ def test_node_parameter_file_serves_as_settings_file(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'message'), [
-    ('lcd: {taget: wl}', r'lcd: unknown setting taget; there are: .*target'),
-    ('lcs: {target: wl}', r"unknown section 'lcs'; there are: .*lcd"),
+    ('lcd: {taget: wl}', r'lcd: unknown setting taget \(did you mean target\?\); there are: '),
+    ('lcs: {target: wl}', r'unknown section lcs \(did you mean lcd\?\); there are: .*lcd'),
     ('- 1', 'expected sections, found list'),
     ('lcd: 3', 'expected NAME: VALUE, found 3'),
     ('a: [', r'settings\.yaml cannot be read as YAML: while parsing'),

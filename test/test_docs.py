@@ -17,7 +17,7 @@ PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'bags/READM
 LONG = ('tried.md', 'licences.md')
 MOST_WORDS = 1500
 OF_OTHER_PROGRAMS = {
-    '--break-system-packages', '--from-paths', '--ignore-src', '--user',  # pip, rosdep
+    '--from-paths', '--ignore-src',  # rosdep
     '--params-file', '--ros-args', '--show-args', '--help',  # ROS
     '--nthreads', '--only', '--scale', '--strict', '--upgrade'}  # dask, soak, mypy, lock
 CODE = re.compile(r'```.*?```|`[^`]+`', re.S)

@@ -8,6 +8,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.replay import read_payloads
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
@@ -186,6 +187,21 @@ def test_a_missing_decision_is_named_by_its_stamp(ros, bag, tmp_path):
     with pytest.raises(EvaluationError, match=f'{STAMPS[3]} ns .*4 frames published, 3 decided'):
         node.work(ros.spin)
     assert not record.exists()  # a recording that looks whole is whole
+
+
+@pytest.mark.parametrize('record_frames', [True, False])
+def test_a_recording_has_what_was_replayed(ros, bag, frames, pipeline, tmp_path, record_frames):
+    record = tmp_path / 'record'
+    node = replay(ros, bag, lockstep=True, record=str(record), record_frames=record_frames)
+    assert node.work(ros.spin) == 0
+    node.close()
+    with BagFile(record) as recorded:
+        assert recorded.topics == {
+            '/graph': 'adversarial_lcd_ros/msg/MultiTierGraph',
+            '/loop_closures': 'adversarial_lcd_ros/msg/LoopClosure',
+            **({'/image/compressed': TYPE} if record_frames else {})}
+        assert [wire for _, _, wire in recorded.messages(['/image/compressed'])] == (
+            frames if record_frames else [])
 
 
 def test_damaged_decisions_are_counted_and_survived(ros, bag, pipeline):

@@ -11,6 +11,8 @@ from adversarial_lcd_ros.messages import codec
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
+from std_msgs.msg import Bool, Float64, Header
+
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.lcd import LcdNode
 
@@ -45,6 +47,27 @@ def damaged():
 
 
 DAMAGED = dict(damaged())
+
+
+def test_decisions_are_said_in_standard_messages_too(ros, lcd):
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    found = {topic: ros.collect(topic, lambda message: message, kind, raw=False)
+             for topic, kind in (('probability', Float64), ('loop', Bool), ('match', Header))}
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    ros.until(lambda: all(ros.probe.count_publishers(topic) for topic in found))
+    for index in range(6):
+        graphs.publish(wrap(codec.encode_graph(graph(index))))
+    ros.until(lambda: len(decisions) == len(found['loop']) == len(found['probability']) == 6)
+    matched = [decision for decision in decisions if decision.match_stamp_ns is not None]
+    ros.until(lambda: len(found['match']) == len(matched))
+    assert 0 < len(matched) < 6
+    assert [row.data for row in found['probability']] == [row.probability for row in decisions]
+    assert [row.data for row in found['loop']] == [row.is_loop for row in decisions]
+    assert any(row.data for row in found['loop'])
+    assert [row.stamp.sec * SECOND + row.stamp.nanosec for row in found['match']] == [
+        decision.match_stamp_ns for decision in matched]
+    assert {row.frame_id for row in found['match']} == {'camera'}
 
 
 @pytest.fixture

@@ -129,7 +129,8 @@ def test_use_sim_time_is_no_unknown_parameter(ros):
 
 
 def test_unknown_parameters_are_named_with_the_known_ones(ros):
-    with pytest.raises(ConfigError, match=r'unknown parameter ratioo for attacker; .*ratio, '):
+    with pytest.raises(ConfigError, match=r'unknown parameter ratioo \(did you mean ratio\?\) '
+                       r'for attacker; .*ratio, '):
         ros.start(AttackerNode, ratioo=1e-4)
 
 

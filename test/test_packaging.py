@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
+import yaml
 
 import adversarial_lcd_ros
 from adversarial_lcd_ros.settings import NODE_CONFIGS
@@ -23,8 +24,24 @@ from adversarial_lcd_ros.settings import NODE_CONFIGS
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'adversarial_lcd_ros'
 NODES = sorted(NODE_CONFIGS)
+EXECUTABLES = sorted([*NODES, 'adversarial-lcd'])
 SHARED = ('launch', 'config', 'msg_schemas', 'bags')
 FAST_DDS = ROOT / 'config' / 'fastdds.xml'
+# Released into Jazzy.
+ROS_PACKAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
+                'rcl_interfaces', 'rclpy', 'ros2launch', 'rosgraph_msgs', 'sensor_msgs',
+                'std_msgs'}
+# Keys of the public lists of rosdep, and the distributions that each installs on Ubuntu 24.04:
+# there is none for mcap and threadpoolctl alone.
+ROSDEP_KEYS = {
+    'mcap-ros2-support': ('mcap-ros2-support', 'mcap'), 'python3-hypothesis': ('hypothesis',),
+    'python3-jinja2': ('jinja2',), 'python3-matplotlib': ('matplotlib',),
+    'python3-networkx': ('networkx',), 'python3-numba': ('numba',), 'python3-numpy': ('numpy',),
+    'python3-onnxruntime-pip': ('onnxruntime',),
+    'python3-opencv': ('opencv-python-headless',), 'python3-pip': ('pip',),
+    'python3-pytest': ('pytest',), 'python3-rich': ('rich',),
+    'python3-rosbags-pip': ('rosbags',), 'python3-scipy': ('scipy',),
+    'python3-sklearn': ('scikit-learn', 'threadpoolctl'), 'python3-yaml': ('pyyaml',)}
 
 
 def copy_sources(destination):
@@ -83,6 +100,42 @@ def test_versions_agree():
     package = ElementTree.parse(ROOT / 'package.xml').getroot()
     assert package.findtext('name') == PACKAGE
     assert package.findtext('version') == adversarial_lcd_ros.__version__
+    setup = ConfigParser()
+    setup.read(ROOT / 'setup.cfg')
+    assert setup['metadata']['version'] == f'attr: {PACKAGE}.__version__'
+    cited = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert (cited['title'], cited['version']) == (PACKAGE, adversarial_lcd_ros.__version__)
+    assert cited['license'] == package.findtext('license') == setup['metadata']['license']
+
+
+def test_package_xml_names_what_is_imported_and_rosdep_keys_that_exist():
+    package = ElementTree.parse(ROOT / 'package.xml').getroot()
+    keys = [entry.text for kind in ('exec_depend', 'test_depend') for entry in package.iter(kind)]
+    assert len(set(keys)) == len(keys)
+    assert set(keys) <= ROS_PACKAGES | set(ROSDEP_KEYS)
+    setup = ConfigParser()
+    setup.read(ROOT / 'setup.cfg')
+    wanted = {re.match(r'[\w-]+', line)[0]
+              for line in setup['options']['install_requires'].split('\n') if line}
+    assert wanted <= {name for key in keys for name in ROSDEP_KEYS.get(key, ())}
+
+
+def run_lines(job):
+    steps = yaml.safe_load((ROOT / '.github/workflows/ci.yml').read_text())['jobs'][job]['steps']
+    return [line for step in steps for line in step.get('run', '').splitlines()]
+
+
+def test_ci_runs_the_lines_of_the_readme():
+    readme = (ROOT / 'README.md').read_text()
+    section = readme.split('### With ROS 2 Jazzy\n')[1].split('\n### ')[0]
+    lines = re.findall(r'^    (.+)$', section, re.M)
+    # The first clones, and the last waits for a camera.
+    assert 'git clone' in lines[0]
+    assert 'image:=' in lines[-1]
+    ran = run_lines('ros')
+    at = ran.index(lines[1])
+    assert ran[at:at + len(lines) - 2] == lines[1:-1]
+    assert run_lines('python')[-3:] == ['make lint', 'make test', 'make demo']
 
 
 def test_every_node_has_an_entry_point():
@@ -98,7 +151,7 @@ def test_every_node_has_an_entry_point():
 def test_wheel_puts_executables_where_ros2_looks(wheel):
     files = data_files(wheel)
     executables = {name: mode for name, mode in files.items() if name.startswith('lib/')}
-    assert sorted(executables) == [f'lib/{PACKAGE}/{node}' for node in NODES]
+    assert sorted(executables) == [f'lib/{PACKAGE}/{name}' for name in EXECUTABLES]
     assert all(mode & stat.S_IXUSR and mode & stat.S_IXOTH for mode in executables.values())
     assert f'share/ament_index/resource_index/packages/{PACKAGE}' in files
 
@@ -130,9 +183,11 @@ def test_executables_run_without_activation_also_after_a_move(environment, tmp_p
     moved = environment.rename(tmp_path / 'moved')
     link = tmp_path / 'link'
     link.symlink_to(moved / 'lib' / PACKAGE / 'bag_replay')
+    (tmp_path / PACKAGE).mkdir()
+    assert run(moved / 'lib' / PACKAGE / 'adversarial-lcd', '--version', cwd=tmp_path).startswith(
+        'adversarial-lcd ')
     for executable in (moved / 'lib' / PACKAGE / 'lcd', link):
         # From a folder with a trap: the package is that of the prefix, never of the folder.
-        (tmp_path / PACKAGE).mkdir(exist_ok=True)
         (tmp_path / PACKAGE / '__init__.py').write_text('raise SystemExit("wrong package")')
         assert '--ros-args' in run(executable, '--help', cwd=tmp_path)
 
@@ -157,7 +212,7 @@ def test_colcon_gives_the_same_executables(tmp_path, options):
     run(colcon, 'build', *options, cwd=tmp_path)
     prefix = tmp_path / 'install' / PACKAGE
     executables = sorted(path.name for path in (prefix / 'lib' / PACKAGE).iterdir())
-    assert executables == sorted([*NODES, 'adversarial-lcd'])
+    assert executables == EXECUTABLES
     assert (prefix / 'share/ament_index/resource_index/packages' / PACKAGE).is_file()
     assert (prefix / 'share' / PACKAGE / 'bags/flat_tour/metadata.yaml').is_file()
 
@@ -244,6 +299,13 @@ def test_launch_puts_the_attacker_between_builder_and_detector(launched):
         'use_sim_time': False, 'ratio': 1e-4, 'mode': 'pass'}
 
 
+def test_launch_lets_the_viewer_look_at_the_same_camera(launched):
+    nodes = launched(view='true', attack='true', image='/camera/image_raw')
+    assert nodes['viewer']['remappings'] == nodes['graph_builder']['remappings'][:2]
+    assert nodes['viewer']['parameters'][1] == {'use_sim_time': False}
+    assert 'viewer' not in launched()
+
+
 def test_launch_replays_a_bag_and_ends_with_it(launched):
     nodes = launched(bag='tour', lockstep='true', target='vbow', namespace='robot',
                      dds_profile='profile.xml')
@@ -255,6 +317,25 @@ def test_launch_replays_a_bag_and_ends_with_it(launched):
 
 
 def test_launch_arguments_are_parameters_of_their_nodes(launched):
-    for node, parameters in launched.module.PARAMETERS.items():
-        known = {name for config in NODE_CONFIGS[node] for name in config.__dataclass_fields__}
-        assert set(parameters) <= known
+    module = launched.module
+    names = [name for parameters in module.PARAMETERS.values() for name in parameters]
+    assert len(set(names)) == len(names)
+    for node, parameters in module.PARAMETERS.items():
+        known = {name: entry.default for config in NODE_CONFIGS[node]
+                 for name, entry in config.__dataclass_fields__.items()}
+        types = {module.boolean: bool, module.found: str}
+        assert {name: types.get(read, read) for name, read in parameters.items()}.items() <= {
+            name: type(default) for name, default in known.items()}.items()
+
+
+def test_launch_finds_what_ships(launched, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    nodes = launched(bag='bags/flat_tour', dds_profile='config/fastdds.xml',
+                     geometric_check='true', stride='2')
+    assert nodes['bag_replay']['parameters'][1]['bag'] == str(ROOT / 'bags/flat_tour')
+    assert nodes['bag_replay']['parameters'][1]['stride'] == 2
+    assert nodes['lcd']['parameters'][1]['geometric_check'] is True
+    assert ('FASTRTPS_DEFAULT_PROFILES_FILE', str(FAST_DDS)) in nodes
+    (tmp_path / 'bags' / 'flat_tour').mkdir(parents=True)
+    assert launched(bag='bags/flat_tour')['bag_replay']['parameters'][1]['bag'] == 'bags/flat_tour'
+    assert launched(bag='/nope')['bag_replay']['parameters'][1]['bag'] == '/nope'

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from pathlib import Path
 import sys
 from zipfile import ZipFile
 
@@ -59,7 +60,8 @@ def registry(monkeypatch):
     monkeypatch.setattr(provision, 'SOURCE_SHA256', {
         'model.pdmodel': digest(NETWORK), 'model.pdiparams': digest(WEIGHTS)})
     monkeypatch.setattr(provision, 'MODEL_SHA256', digest(CONVERTED))
-    monkeypatch.setattr(provision, '_converter_python', lambda path: ('3.11', sys.executable))
+    monkeypatch.setattr(provision, '_converter_python', lambda: ('3.11', sys.executable))
+    monkeypatch.setattr(provision, 'SHIPPED', Path('nowhere'))
     return files, downloads
 
 
@@ -107,8 +109,25 @@ def test_what_is_not_as_expected_leaves_nothing_behind(
 def test_python_without_converter_is_told_before_any_download(tmp_path, monkeypatch):
     monkeypatch.setattr(provision, '_pythons', lambda: iter([('3.13', sys.executable)]))
     monkeypatch.setattr(provision, '_download', None)
-    with pytest.raises(ModelError, match=r'3\.12, 3\.11, 3\.10; .*copy picodet_s_coco\.onnx to'):
-        provision.fetch_object_model(tmp_path / 'pico.onnx')
+    with pytest.raises(ModelError, match=r'3\.12, 3\.11, 3\.10; .*leave out --anew'):
+        provision.fetch_object_model(tmp_path / 'pico.onnx', anew=True)
+
+
+def test_the_model_that_ships_needs_no_network_and_no_converter(tmp_path, monkeypatch):
+    monkeypatch.setattr(provision, '_download', None)
+    monkeypatch.setattr(provision, '_pythons', lambda: iter([('3.13', sys.executable)]))
+    path = provision.fetch_object_model(tmp_path / 'pico.onnx')
+    assert provision.sha256(path) == provision.MODEL_SHA256
+    assert json.loads(path.with_suffix('.json').read_text())['sha256'] == provision.MODEL_SHA256
+    assert sorted(os.listdir(tmp_path)) == ['pico.json', 'pico.onnx']
+
+
+def test_a_damaged_model_that_ships_is_not_passed_on(tmp_path, monkeypatch):
+    (tmp_path / 'shipped.onnx').write_bytes(b'damaged')
+    monkeypatch.setattr(provision, 'SHIPPED', tmp_path / 'shipped.onnx')
+    with pytest.raises(ModelError, match='install it again'):
+        provision.fetch_object_model(tmp_path / 'models' / 'pico.onnx')
+    assert os.listdir(tmp_path / 'models') == []
 
 
 def test_another_python_on_the_path_serves_the_converter(tmp_path, monkeypatch):

@@ -19,7 +19,6 @@ from adversarial_lcd_ros.messages.codec import (
     encode_loop_closure,
 )
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE
-from adversarial_lcd_ros.sequences.replay import PAYLOAD
 
 COUNT = 24
 # The target that flips of edges turn over on graphs as random as these.
@@ -53,7 +52,7 @@ def record(path, run, namespace='', leave_out=(), lost=()):
 
 def payload(data):
     layout = make.ROS2.make('std_msgs/msg/MultiArrayLayout', dim=[], data_offset=0)
-    return make.ROS2.make(PAYLOAD, layout=layout, data=np.frombuffer(data, np.uint8))
+    return make.ROS2.make(WIRE_TYPE, layout=layout, data=np.frombuffer(data, np.uint8))
 
 
 def evaluate(bag, tmp_path, *options):

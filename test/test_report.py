@@ -1,14 +1,13 @@
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from html.parser import HTMLParser
-import io
 import json
 
 from graph_factory import make_graph
 import numpy as np
 import pytest
-from rich.console import Console
 
+from adversarial_lcd_ros.commands.common import print_lines
 from adversarial_lcd_ros.config import AttackConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
@@ -16,7 +15,7 @@ from adversarial_lcd_ros.evaluation import results, wording
 from adversarial_lcd_ros.evaluation.methods import whose
 from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
-from adversarial_lcd_ros.evaluation.replay import report, tables
+from adversarial_lcd_ros.evaluation.replay import report
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
@@ -27,6 +26,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.terminal import replay_lines
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
 from adversarial_lcd_ros.lcd.geometry import count_inliers
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
@@ -261,12 +261,17 @@ def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
 
 
 def test_the_owner_of_an_attack_comes_from_its_class():
-    owner = {method: whose({'perturbation': method, 'search': 'stepwise'})
-             for method in PERTURBATIONS}
-    assert set(owner.values()) == {'paper'}
-    assert whose({'perturbation': '', 'search': 'recall'}) == 'ours'
-    assert whose({'perturbation': '', 'search': 'optimum'}) == 'control'
-    assert whose({'perturbation': None, 'search': None}) == ''
+    def owner(perturbation, surrogate='svm_rbf', search='stepwise', mode='query'):
+        return whose({'perturbation': perturbation, 'surrogate': surrogate, 'search': search,
+                      'mode': mode})
+
+    assert {owner(method) for method in PERTURBATIONS} == {'paper'}
+    assert owner('random_flip', 'none') == 'control'
+    assert owner('eigencentrality', 'ard') != 'paper'
+    assert owner('', '', 'recall') == 'ours'
+    assert owner('', '', 'optimum') == 'bound'
+    assert owner('eigencentrality', mode='pass') == 'control'
+    assert owner(None, None, None, None) == ''
 
 
 def test_a_check_behind_the_detector_takes_loops_back(records):
@@ -314,12 +319,21 @@ def test_text_in_the_colours_of_attacks_can_be_read():
         assert 1.05 / (luminance(colour) + 0.05) >= 4.5, colour
 
 
-def test_terminal_tables(summary):
-    console = Console(width=200, record=True, file=io.StringIO())
-    console.print(tables.decline_table(summary))
-    console.print(tables.figure_table(summary))
-    shown = console.export_text()
-    assert all(attack['name'] in shown for attack in summary['attacks'])
+@pytest.mark.parametrize('width', [80, 120])
+def test_the_terminal_has_a_line_for_each_attack(summary, width, monkeypatch, capsys):
+    monkeypatch.setenv('COLUMNS', str(width))
+    longer = {**summary['attacks'][0], 'name': 'eigencentrality + SVM-RBF, no queries at all'}
+    title, rows = replay_lines({**summary, 'attacks': [*summary['attacks'], longer]})
+    print_lines(title, rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= width
+    assert len(lines) == 2 + len(rows)
+    for line, row in zip(lines[2:], rows, strict=True):
+        # Names give way, figures do not.
+        *_, decline = row.values()
+        assert line.rstrip().endswith(decline)
+        assert line.startswith(row['attack'][:9])
+        assert row['attack'][-8:] in line
 
 
 def test_an_attack_without_a_name_is_told_by_its_settings(summary):
@@ -432,9 +446,9 @@ def test_the_report_without_ground_truth_says_what_is_missing(bare, bare_records
     for unsaid in ('None', 'a new place', 'Decline', 'block bootstrap'):
         assert unsaid not in page
     assert report.report_folder(folder.path).read_text() == page
-    console = Console(file=io.StringIO(), width=150)
-    console.print(tables.decline_table(bare), tables.figure_table(bare))
-    assert 'success rate' in console.file.getvalue()
+    title, rows = replay_lines(bare)
+    assert 'no ground truth' in title
+    assert rows[0]['changed'] == '7'
 
 
 def test_pictures_without_ground_truth_show_what_changed(bare_records):

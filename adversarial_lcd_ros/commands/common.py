@@ -10,10 +10,13 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from adversarial_lcd_ros.start import QUIET
+
 if TYPE_CHECKING:
     from rich.console import Console
 
 TABLE_WIDTH = 150
+_LEAST_NAME = 12
 Commands: TypeAlias = '_SubParsersAction[ArgumentParser]'
 
 
@@ -21,8 +24,18 @@ def add_command(commands: Commands, name: str, help: str,
                 run: Callable[[Namespace], None]) -> ArgumentParser:
     """Add a command that calls ``run`` with its options; return its parser."""
     parser = commands.add_parser(name, help=help, description=help)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, parser=parser)
+    parser.add_argument('-q', '--quiet', action='store_true',
+                        help='say nothing but results, warnings and errors')
     return parser
+
+
+def be_quiet(quiet: bool) -> None:
+    """Set whether ``tell`` and ``progress_bar`` show nothing; also in processes from here on."""
+    if quiet:
+        os.environ[QUIET] = '1'
+    else:
+        os.environ.pop(QUIET, None)
 
 
 def add_json_option(parser: ArgumentParser) -> None:
@@ -49,6 +62,34 @@ def print_rows(title: str, rows: Sequence[Mapping[str, str]]) -> None:
     for row in rows:
         table.add_row(*row.values())
     make_console().print(table)
+
+
+def print_lines(title: str, rows: Sequence[Mapping[str, str]]) -> None:
+    """Print rows of heading to cell, each on a line of 80 columns, or of the terminal's."""
+    from rich.table import Table
+    from rich.text import Text
+
+    console = make_console()
+    widths = {heading: max(len(heading), *(len(row[heading]) for row in rows))
+              for heading in (rows[0] if rows else ())}
+    # The first column gives way; what is behind it are figures. Two blanks are between columns.
+    room = console.width - sum(list(widths.values())[1:]) - 2 * (len(widths) - 1)
+    table = Table(box=None, padding=(0, 1), pad_edge=False)
+    for index, heading in enumerate(widths):
+        table.add_column(heading, justify='left' if index < 2 else 'right', no_wrap=True)
+    for row in rows:
+        name, *figures = row.values()
+        table.add_row(_shortened(name, max(_LEAST_NAME, room)), *figures)
+    console.print(Text(title))
+    console.print(table)
+
+
+def _shortened(name: str, width: int) -> str:
+    """Return a name with its middle left out where it is too wide: its end tells it apart."""
+    if len(name) <= width:
+        return name
+    tail = (width - 1) // 2
+    return f'{name[:width - 1 - tail]}…{name[-tail:]}'
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -139,6 +180,9 @@ def imported_source(source: str, options: Namespace, *, replayed: bool = False) 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on stderr; yield what is to be called with the work done and the whole."""
+    if QUIET in os.environ:
+        yield lambda done, total: None
+        return
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -161,5 +205,6 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def tell(text: str) -> None:
-    """Print a line on stderr."""
-    print(text, file=sys.stderr, flush=True)
+    """Print a line on stderr; with --quiet only a warning."""
+    if QUIET not in os.environ or text.startswith('warning'):
+        print(text, file=sys.stderr, flush=True)

@@ -17,6 +17,7 @@ from adversarial_lcd_ros.commands.common import (
     imported_source,
     make_console,
     print_json,
+    print_lines,
     source_options,
     tell,
 )
@@ -173,21 +174,17 @@ def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
 def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     """Print the tables and the main finding of an evaluation."""
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
-    from adversarial_lcd_ros.evaluation.replay.tables import (
-        decline_table,
-        figure_table,
-        sweep_table,
-    )
+    from adversarial_lcd_ros.evaluation.replay.tables import sweep_table
+    from adversarial_lcd_ros.evaluation.terminal import replay_lines
     from adversarial_lcd_ros.evaluation.wording import headline
 
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
         return
     console = make_console()
-    console.print(figure_table(summary))
-    console.print(decline_table(summary))
+    print_lines(*replay_lines(summary))
     if 'label_sweep' in summary:
         console.print(sweep_table(summary))
-    console.print(headline(summary), soft_wrap=True)
+    console.print(headline(summary))
     console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
                   soft_wrap=True)

@@ -12,7 +12,13 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from adversarial_lcd_ros.commands.common import make_console, print_json, progress_bar, tell
+from adversarial_lcd_ros.commands.common import (
+    make_console,
+    print_json,
+    print_lines,
+    progress_bar,
+    tell,
+)
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -22,6 +28,7 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
+from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.run import Experiment
@@ -186,6 +193,9 @@ def _workers(options: Namespace) -> AbstractContextManager[Run]:
 @contextmanager
 def _bar(experiment: Experiment) -> Iterator[Callable[[float, float], None]]:
     """Show cells and time left; the time by the expected costs, the cells as they are counted."""
+    if QUIET in os.environ:
+        yield lambda cells, share: None
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
 
@@ -198,16 +208,20 @@ def _bar(experiment: Experiment) -> Iterator[Callable[[float, float], None]]:
 
 
 def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
-    from rich.table import Table
-
     from adversarial_lcd_ros.evaluation.frames.run import kinds_of_cells
+    from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
+    from adversarial_lcd_ros.evaluation.terminal import experiment_lines
 
-    table = Table('attack', 'frames', 'queries, ms', 'search, ms', 'judging, ms',
-                  title='Processor time a frame')
-    for kind, frames, seconds in kinds_of_cells(rows):
-        table.add_row(kind, str(frames), *(f'{1e3 * part:.1f}' for part in seconds))
     console = make_console()
-    console.print(table)
+    tables, finding = experiment_lines(summarise_cells(rows))
+    for title, lines in tables:
+        print_lines(title, lines)
+    console.print(finding)
+    if QUIET not in os.environ:
+        print_lines('Processor time a frame, ms', [
+            {'attack': kind, 'frames': str(frames), 'queries': f'{1e3 * queries:.1f}',
+             'search': f'{1e3 * search:.1f}', 'judging': f'{1e3 * judging:.1f}'}
+            for kind, frames, (queries, search, judging) in kinds_of_cells(rows)])
     releases = sorted({row['versions'] for row in rows})
     if len(releases) > 1:
         console.print(f'The cells were made with several releases of the libraries: '

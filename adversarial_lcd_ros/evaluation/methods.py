@@ -8,8 +8,8 @@ from typing import Any
 
 from adversarial_lcd_ros.attack.search import COMMON_SETTINGS
 from adversarial_lcd_ros.config import AttackConfig
-from adversarial_lcd_ros.registry import PERTURBATIONS, SEARCHES, SURROGATES, YARDSTICKS
-from adversarial_lcd_ros.shown import OTHERS_RANK, OURS_RANK, YARDSTICK_RANK, Shown
+from adversarial_lcd_ros.registry import NONE, PERTURBATIONS, SEARCHES, SURROGATES, YARDSTICKS
+from adversarial_lcd_ros.shown import OTHERS_RANK, OURS_RANK, Shown
 
 # Columns of a row that say what ran; '' where a search has no such thing.
 COLUMNS = ('search', 'perturbation', 'surrogate')
@@ -40,20 +40,6 @@ def method_of(row: Mapping[str, Any]) -> str:
     return str(row['perturbation'] or row['search'])
 
 
-def whose(row: Mapping[str, Any]) -> str:
-    """
-    Return where what chooses the flips comes from, by its rank (``Shown``).
-
-    'paper', 'ours', 'control' for what looks into the detector, 'other' for all else; '' where
-    nobody knows what ran, or nothing was changed.
-    """
-    if not method_of(row) or method_of(row) == 'None':
-        return ''
-    rank = method_facts(method_of(row)).rank
-    return ('paper' if rank < OTHERS_RANK else 'other' if rank < OURS_RANK else
-            'ours' if rank < YARDSTICK_RANK else 'control')
-
-
 def method_facts(method: str) -> type[Shown]:
     """Return the class of a perturbation, a search or a yardstick, for its facts."""
     return _facts(method, PERTURBATIONS, SEARCHES, YARDSTICKS)
@@ -62,6 +48,29 @@ def method_facts(method: str) -> type[Shown]:
 def surrogate_facts(surrogate: str) -> type[Shown]:
     """Return the class of a surrogate, for its facts."""
     return _facts(surrogate, SURROGATES)
+
+
+def whose(row: Mapping[str, Any]) -> str:
+    """
+    Return whose an attack is: paper, ours, other, control, or bound; '' where nobody knows.
+
+    'bound' looks into the detector and is no attack that anybody could carry out. 'other' is from
+    elsewhere in the literature, or of the user's own.
+    """
+    if row['mode'] == 'pass':
+        return 'control'
+    if not row['search']:
+        return ''
+    if is_yardstick(row):
+        return 'bound'
+    method, surrogate = method_of(row), row['surrogate']
+    if method == 'random_flip' and surrogate in ('', NONE):
+        return 'control'
+    ranks = [method_facts(method).rank] + (
+        [] if surrogate in ('', NONE) else [surrogate_facts(surrogate).rank])
+    if max(ranks) >= OURS_RANK:
+        return 'ours'
+    return 'paper' if max(ranks) < OTHERS_RANK else 'other'
 
 
 def _facts(name: str, *tables: Any) -> type[Shown]:

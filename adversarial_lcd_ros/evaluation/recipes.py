@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.errors import ConfigError, FileError
+from adversarial_lcd_ros.errors import ConfigError, FileError, with_suggestions
 from adversarial_lcd_ros.files.reading import read_yaml
 from adversarial_lcd_ros.paths import share_path
 
@@ -72,6 +72,7 @@ def find_recipe(name: str) -> Path:
     folder = share_path(FOLDER)
     path = folder / f'{name}.yaml'
     if not path.is_file():
-        there = ', '.join(sorted(entry.stem for entry in folder.glob('*.yaml')))
-        raise ConfigError(f'no recipe {name!r}; there are: {there}, or give a .yaml file')
+        there = sorted(entry.stem for entry in folder.glob('*.yaml'))
+        raise ConfigError(f'no recipe {with_suggestions([repr(name)], map(repr, there))}; there '
+                          f'are: {", ".join(there)}, or give a .yaml file')
     return path

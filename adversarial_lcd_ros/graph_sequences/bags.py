@@ -13,7 +13,7 @@ from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence, open_graphs
 from adversarial_lcd_ros.messages.codec import encode_graph
-from adversarial_lcd_ros.messages.payload import WIRE_TYPE, wrap
+from adversarial_lcd_ros.messages.payload import bag_type
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 from adversarial_lcd_ros.sequences.companions import companions_of
 from adversarial_lcd_ros.sequences.importing import pose_messages
@@ -42,9 +42,10 @@ def build_graph_bag(source: str, destination: Path, config: BuilderConfig, *,
     """
     Write the graphs of a sequence, and its ground truth, as a rosbag2 in MCAP.
 
-    Graphs become std_msgs/UInt8MultiArray on /graph. The settings that they were built with,
-    and the schemas of the payloads, go into the metadata; credits and licence files of a source
-    folder, and what tells labels what its views share, go with what was made of the pictures.
+    Graphs become adversarial_lcd_ros/msg/MultiTierGraph on /graph. The settings that they were
+    built with, and the schemas of the payloads, go into the metadata; credits and licence files
+    of a source folder, and what tells labels what its views share, go with what was made of the
+    pictures.
 
     Parameters
     ----------
@@ -92,4 +93,4 @@ def write_graphs(bag: BagWriter, found: GraphSequence, topic: str = GRAPH_TOPIC)
 def _graph_messages(graphs: list[MultiTierGraph],
                     topic: str) -> Iterator[tuple[str, str, int, bytes]]:
     for graph in graphs:
-        yield topic, WIRE_TYPE, graph.stamp_ns, wrap(encode_graph(graph))
+        yield topic, bag_type(GRAPH_TOPIC), graph.stamp_ns, encode_graph(graph)

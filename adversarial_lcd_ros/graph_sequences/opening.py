@@ -22,7 +22,7 @@ from adversarial_lcd_ros.graph_sequences.cache import cache_key, load_graphs, sa
 from adversarial_lcd_ros.messages.codec import decode_graph
 from adversarial_lcd_ros.paths import cache_folder
 from adversarial_lcd_ros.sequences import Sequence, Trajectory, open_sequence
-from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, PAYLOAD, BagFile, is_bag
+from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE, BagFile, is_bag
 from adversarial_lcd_ros.sequences.bags import bag_trajectory
 from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
@@ -242,7 +242,7 @@ def holds_graphs(path: Path) -> bool:
     if not is_bag(path):
         return False
     with BagFile(path) as bag:
-        return not bag.of_type(IMAGE, COMPRESSED_IMAGE) and bool(bag.of_type(PAYLOAD))
+        return not bag.of_type(IMAGE, COMPRESSED_IMAGE) and bool(bag.payload_topics())
 
 
 def _recorded_graphs(part: SequencePart) -> GraphSequence:

@@ -41,7 +41,10 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
     try:
         matrix, inlier = _fundamental(points, cv2.USAC_DEFAULT, threshold_px)
     except cv2.error:
-        # On some planar scenes USAC refines an empty matrix and raises; RANSAC does not refine.
+        matrix = None
+    if matrix is None:
+        # On some planar scenes USAC refines an empty matrix and raises, in OpenCV 4.6 it gives
+        # up on all of them; RANSAC does not refine.
         matrix, inlier = _fundamental(points, cv2.FM_RANSAC, threshold_px)
     # None where the matches determine no matrix, as unrelated ones on one line.
     return 0 if matrix is None else int(np.count_nonzero(inlier))

@@ -68,6 +68,7 @@ class BagReplayNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self._config, node_config = self.settings
+        self._records_frames = bool(node_config.record and node_config.record_frames)
         if not node_config.bag:
             raise ConfigError('parameter bag is empty: give the bag to replay, -p bag:=PATH')
         self._replay = Replay(Path(node_config.bag), self._config)
@@ -110,11 +111,11 @@ class BagReplayNode(PipelineNode):
                 self._on_decision(wire)
         return on_message
 
-    def _record(self, topic: str, wire: bytes) -> None:
+    def _record(self, topic: str, wire: bytes, message_type: str = WIRE_TYPE) -> None:
         if self._recorder is None or self._broken is not None:
             return
         try:
-            self._recorder.write(topic, WIRE_TYPE, self._time_ns, wire)
+            self._recorder.write(topic, message_type, self._time_ns, wire)
         except Exception as error:
             # Callbacks survive anything; a recording with holes must not.
             self._broken = error
@@ -153,7 +154,7 @@ class BagReplayNode(PipelineNode):
         return EXIT_OK
 
     def _play(self, show: Callable[[int], None]) -> None:
-        for topic, _, stamp_ns, cdr in self._replay:
+        for topic, kind, stamp_ns, cdr in self._replay:
             is_frame = topic in self._replay.frame_topics
             self._turn(0.0)
             if not self._config.lockstep:
@@ -166,6 +167,8 @@ class BagReplayNode(PipelineNode):
                 self._under_way[stamp_ns] = time.monotonic()
                 self._strangers.sent(stamp_ns)
                 self._published += 1
+            if self._records_frames and Path(topic).name not in RECORDED:
+                self._record(topic, cdr, kind)
             self._outputs[topic].publish(cdr)
             self.diagnostics.count('published messages')
             show(self._published)

@@ -23,6 +23,7 @@ from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
+from adversarial_lcd_ros.nodes.decisions import PlainDecisions
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
@@ -45,6 +46,8 @@ class LcdNode(PipelineNode):
         subscribes=('graph (std_msgs/UInt8MultiArray, MultiTierGraph): judged, then remembered',
                     'query (std_msgs/UInt8MultiArray, LcdQuery): judged only'),
         publishes=('loop_closures (std_msgs/UInt8MultiArray, LoopClosure): one for each graph',
+                   'probability (std_msgs/Float64), loop (std_msgs/Bool), match (std_msgs/Header: '
+                   'stamp of the best matching keyframe): of each decision, for echo and plots',
                    'answer (std_msgs/UInt8MultiArray, LcdAnswer): one for each query, same id',
                    '/diagnostics (diagnostic_msgs/DiagnosticArray): counts, keyframes, latency'))
 
@@ -57,6 +60,7 @@ class LcdNode(PipelineNode):
         self._rate = Rate(node_config.max_queries_per_s)
         self._watch = GraphWatch(self.diagnostics)
         self._decisions = create_payload_publisher(self, 'loop_closures')
+        self._plain = PlainDecisions(self)
         self._answers = create_payload_publisher(self, 'answer')
         self._graphs = MirroredSubscription(
             self, UInt8MultiArray, 'graph', 'graph', self._on_graph, raw=True)
@@ -77,6 +81,7 @@ class LcdNode(PipelineNode):
         self._watch.note(graph)
         decision = replace(self.detector.detect(graph), session=self.session)
         self._decisions.publish(wrap(codec.encode_loop_closure(decision)))
+        self._plain.publish(decision)
         self.diagnostics.count('published loop closures')
         self.diagnostics.count('loops declared', int(decision.is_loop))
         self.diagnostics.time(time.perf_counter() - arrival_s)

@@ -17,7 +17,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from adversarial_lcd_ros.config import Config
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.settings import limits
 
 # Declared by rclpy itself, on every node.
@@ -57,7 +57,8 @@ def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:
     known = {entry.name for config in configs for entry in fields(config)}
     unknown = sorted(set(given) - known)
     if unknown:
-        raise ConfigError(f'unknown parameter {", ".join(unknown)} for {node.get_name()}; '
+        raise ConfigError(f'unknown parameter {with_suggestions(unknown, sorted(known))} for '
+                          f'{node.get_name()}; '
                           f'there are: {", ".join(sorted(known))}')
     settings = []
     for config in configs:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import os
 import sys
 import time
 from typing import Protocol
+
+from adversarial_lcd_ros.start import QUIET
 
 _LINE_PERIOD_S = 5.0
 
@@ -30,7 +33,9 @@ def progress(title: str, total: int) -> Iterator[Advance]:
         Frames to come.
 
     """
-    if sys.stderr.isatty():
+    if QUIET in os.environ:
+        yield lambda frames: None
+    elif sys.stderr.isatty():
         from rich.console import Console
         from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
         with Progress(*Progress.get_default_columns()[:2], MofNCompleteColumn(),

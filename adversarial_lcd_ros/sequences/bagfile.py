@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from adversarial_lcd_ros.errors import AdversarialLcdError, SequenceError
 from adversarial_lcd_ros.messages.codec import typestore
-from adversarial_lcd_ros.messages.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages.payload import PAYLOAD_TYPES
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, join_ns
 from adversarial_lcd_ros.sequences.damage import METADATA, diagnose, missing_messages
 from adversarial_lcd_ros.sequences.image_files import is_hidden
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 IMAGE, COMPRESSED_IMAGE = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
 POSE = 'geometry_msgs/msg/PoseStamped'
-PAYLOAD = WIRE_TYPE
 TF = 'tf2_msgs/msg/TFMessage'
 # What /tf was called before tf2, as in the bags of the TUM RGB-D benchmark.
 OLD_TF = ('tf/msg/tfMessage', 'tf/msg/TFMessage')
@@ -133,6 +132,10 @@ class BagFile:
         """Return the topics that hold messages of these types, sorted."""
         return sorted(topic for topic, kind in self.topics.items()
                       if kind in types and self.counts[topic])
+
+    def payload_topics(self) -> list[str]:
+        """Return the topics that hold payloads, typed or as over the wire, sorted."""
+        return self.of_type(*PAYLOAD_TYPES)
 
     def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
         """

@@ -21,6 +21,9 @@ from adversarial_lcd_ros.sequences.frame import Frame, check_camera_file, open_c
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.stamps import LOG, frame_stamps
 
+# Topics of pictures that were drawn here, raw or compressed.
+DRAWN = ('overlay', 'view')
+
 
 def bag_sequence(path: Path, topic: str | None, ground_truth: Path | str | None,
                  truth: TruthOptions | None = None, stamps: str | None = None) -> Sequence:
@@ -125,7 +128,9 @@ def _find_topic(bag: BagFile) -> str:
 
 def camera_topics(bag: BagFile) -> list[str]:
     """Return the topics whose first message is a camera's, and not depth, sorted."""
-    return [topic for topic in bag.of_type(IMAGE, COMPRESSED_IMAGE) if _is_camera(bag, topic)]
+    return [topic for topic in bag.of_type(IMAGE, COMPRESSED_IMAGE)
+            if topic.rsplit('/', 2)[-1 - topic.endswith('/compressed')] not in DRAWN
+            and _is_camera(bag, topic)]
 
 
 def described_topics(bag: BagFile) -> str:

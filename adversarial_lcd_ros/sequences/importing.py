@@ -93,7 +93,7 @@ def import_sequence(source: Path | str, destination: Path | str, *,
         frames = _counted(sequence.frames(), sequence.frame_count, raw_as, progress)
         # At the same time, the image comes last: the key sorts by nothing else.
         for message_topic, message_type, stamp_ns, cdr in heapq.merge(
-                camera_messages(sequence), poses, map(_image_message, frames),
+                camera_messages(sequence), poses, map(image_message, frames),
                 key=lambda row: row[2]):
             bag.write(message_topic, message_type, stamp_ns, cdr)
         for file in beside:
@@ -118,12 +118,13 @@ def _counted(frames: Iterator[Frame], total: int, raw_as: str,
             progress(done, total)
 
 
-def _image_message(frame: Frame) -> tuple[str, str, int, bytes]:
+def image_message(frame: Frame, topic: str = IMAGE_TOPIC) -> tuple[str, str, int, bytes]:
+    """Return a frame that is compressed as a message: (topic, type, stamp, CDR)."""
     types: Any = typestore().types
     message = types[COMPRESSED_IMAGE](
         header=header(frame.stamp_ns, CAMERA_FRAME), format=frame.encoding,
         data=np.frombuffer(frame.data, np.uint8))
-    return (IMAGE_TOPIC, COMPRESSED_IMAGE, frame.stamp_ns,
+    return (topic, COMPRESSED_IMAGE, frame.stamp_ns,
             bytes(typestore().serialize_cdr(message, COMPRESSED_IMAGE)))
 
 

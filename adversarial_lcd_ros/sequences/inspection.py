@@ -14,7 +14,7 @@ from adversarial_lcd_ros.errors import CodecError, FileError
 from adversarial_lcd_ros.files.reading import read_bytes
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.messages import codec
-from adversarial_lcd_ros.messages.payload import WIRE_TYPE
+from adversarial_lcd_ros.messages.payload import PAYLOAD_TYPES, payload_of
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.opening import open_sequence
 
@@ -129,7 +129,7 @@ def inspect_sequence(path: Path, **options: Any) -> dict[str, str]:
 
 def _topic(bag: BagFile, name: str) -> TopicSummary:
     kind, count = bag.topics[name], bag.counts[name]
-    if kind != WIRE_TYPE or not count:
+    if kind not in PAYLOAD_TYPES or not count:
         return TopicSummary(name, kind, count)
     payload, _ = identify_payload(next(_payloads(bag, name)))
     if payload != 'MultiTierGraph':
@@ -140,7 +140,7 @@ def _topic(bag: BagFile, name: str) -> TopicSummary:
 
 def _payloads(bag: BagFile, name: str) -> Iterator[bytes]:
     for topic, _, wire in bag.messages([name]):
-        yield bag.decode(topic, wire).data.tobytes()
+        yield payload_of(bag.topics[topic], wire)
 
 
 def identify_payload(data: bytes) -> tuple[str, Any]:

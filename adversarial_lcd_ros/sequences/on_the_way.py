@@ -19,7 +19,6 @@ from adversarial_lcd_ros.sequences.bag_truth import TRUTH_FILE, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import (
     COMPRESSED_IMAGE,
     IMAGE,
-    PAYLOAD,
     BagFile,
     is_bag,
 )
@@ -43,7 +42,7 @@ def is_imported(path: Path) -> bool:
     if not is_bag(path):
         return False
     with BagFile(path) as bag:
-        payloads = set(bag.of_type(PAYLOAD))
+        payloads = set(bag.payload_topics())
         has_images = bool(bag.of_type(IMAGE, COMPRESSED_IMAGE))
         filled = {topic for topic, count in bag.counts.items() if count}
         return not bag.is_ros1 and (filled <= _REPLAYED | payloads if has_images

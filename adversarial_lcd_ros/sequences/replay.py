@@ -12,17 +12,23 @@ import heapq
 from pathlib import Path
 import threading
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, SequenceError
-from adversarial_lcd_ros.messages.codec import MESSAGES, schema_text, typestore
-from adversarial_lcd_ros.messages.payload import unwrap
+from adversarial_lcd_ros.messages.codec import MESSAGES, schema_text
+from adversarial_lcd_ros.messages.payload import (
+    PAYLOAD_TYPES,
+    WIRE_TYPE,
+    bag_type,
+    payload_of,
+    wrap,
+)
 from adversarial_lcd_ros.paths import PACKAGE
-from adversarial_lcd_ros.sequences.bagfile import PAYLOAD, POSE, BagFile, BagWriter
+from adversarial_lcd_ros.sequences.bagfile import POSE, BagFile, BagWriter
 from adversarial_lcd_ros.sequences.bags import camera_topics, described_topics
 from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns, with_cdr_stamp
 from adversarial_lcd_ros.sequences.sequence import check_order
@@ -58,7 +64,7 @@ class Replay:
     Attributes
     ----------
     topics : dict of str to str
-        What is replayed: topic to message type.
+        What is replayed: topic to message type, as over the wire.
     frame_topics : tuple of str
         The topic of the frames.
     frame_count : int
@@ -79,10 +85,12 @@ class Replay:
                 raise SequenceError(f'{path} is a bag of ROS 1: make one of ROS 2 with '
                                     '"adversarial-lcd import"')
             self._frame_topic = _frame_topic(bag)
-            self._beside = [*bag.of_type(POSE), *(topic for topic in bag.of_type(PAYLOAD)
+            self._beside = [*bag.of_type(POSE), *(topic for topic in bag.payload_topics()
                                                   if _name(topic) == DETECTIONS_TOPIC)]
-            self.topics = {topic: bag.topics[topic]
+            self._types = {topic: bag.topics[topic]
                            for topic in (self._frame_topic, *self._beside)}
+            self.topics = {topic: WIRE_TYPE if kind in PAYLOAD_TYPES else kind
+                           for topic, kind in self._types.items()}
             self.frame_topics = (self._frame_topic,)
             stamps = _frame_stamps(bag, self._frame_topic)
         self._select(stamps)
@@ -115,17 +123,22 @@ class Replay:
     def _once(self) -> Iterator[tuple[str, int, bytes]]:
         # Bags are in order of arrival, a replay in order of the stamps: /clock must not go back.
         with BagFile(self._path) as bag:
-            beside = [(topic, _stamp_ns(self.topics[topic], wire), wire)
-                      for topic, _, wire in bag.messages(self._beside)]
+            beside = [self._row(topic, wire) for topic, _, wire in bag.messages(self._beside)]
             kept = (row for row in beside if self._first_ns <= row[1] < self._end_ns)
             yield from heapq.merge(sorted(kept, key=lambda row: row[1]), self._frames(bag),
                                    key=lambda row: row[1])
 
     def _frames(self, bag: BagFile) -> Iterator[tuple[str, int, bytes]]:
         for topic, _, wire in bag.messages([self._frame_topic]):
-            stamp_ns = _stamp_ns(self.topics[topic], wire)
-            if stamp_ns in self._kept:
-                yield topic, stamp_ns, wire
+            row = self._row(topic, wire)
+            if row[1] in self._kept:
+                yield row
+
+    def _row(self, topic: str, wire: bytes) -> tuple[str, int, bytes]:
+        """Return topic, stamp and the message as it goes over the wire."""
+        kind = self._types[topic]
+        typed = kind in PAYLOAD_TYPES and kind != WIRE_TYPE
+        return topic, _stamp_ns(kind, wire), wrap(wire) if typed else wire
 
 
 def _frame_topic(bag: BagFile) -> str:
@@ -135,7 +148,7 @@ def _frame_topic(bag: BagFile) -> str:
                             'one with "adversarial-lcd import"')
     if cameras:
         return cameras[0]
-    graphs = {_name(topic): topic for topic in bag.of_type(PAYLOAD)}
+    graphs = {_name(topic): topic for topic in bag.payload_topics()}
     for name in GRAPH_TOPICS:
         if name in graphs:
             return graphs[name]
@@ -147,7 +160,7 @@ def _frame_stamps(bag: BagFile, topic: str) -> NDArray[np.int64]:
     kind = bag.topics[topic]
     rows = [(_stamp_ns(kind, wire), log_ns) for _, log_ns, wire in bag.messages([topic])]
     headers = [stamp for stamp, _ in rows]
-    if kind == PAYLOAD:
+    if kind in PAYLOAD_TYPES:
         # What the pipeline recorded itself may be faster than its stamps.
         return check_order(headers, bag.path)
     return frame_stamps(headers, [log for _, log in rows], bag.path)
@@ -158,27 +171,25 @@ def _name(topic: str) -> str:
 
 
 def _stamp_ns(message_type: str, wire: bytes) -> int:
-    return cdr_stamp_ns(_payload(wire) if message_type == PAYLOAD else wire)
+    return cdr_stamp_ns(_payload(message_type, wire) if message_type in PAYLOAD_TYPES else wire)
 
 
 def _with_stamp(message_type: str, wire: bytes, stamp_ns: int) -> bytes:
-    if message_type != PAYLOAD:
+    if message_type != WIRE_TYPE:
         return with_cdr_stamp(wire, stamp_ns)
-    message: Any = typestore().deserialize_cdr(wire, PAYLOAD)
-    message.data = np.frombuffer(with_cdr_stamp(message.data.tobytes(), stamp_ns), np.uint8)
-    return bytes(typestore().serialize_cdr(message, PAYLOAD))
+    return wrap(with_cdr_stamp(_payload(message_type, wire), stamp_ns))
 
 
-def _payload(wire: bytes) -> bytes:
+def _payload(message_type: str, wire: bytes) -> bytes:
     try:
-        return unwrap(wire)
+        return payload_of(message_type, wire)
     except CodecError as error:
         raise SequenceError(str(error)) from error
 
 
 def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
     """
-    Yield (log time in nanoseconds, payload) of a topic of std_msgs/UInt8MultiArray.
+    Yield (log time in nanoseconds, payload) of a topic of payloads, typed or as over the wire.
 
     A missing slash in front of the topic does not matter.
 
@@ -190,12 +201,12 @@ def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
     """
     with BagFile(Path(path)) as bag:
         name = f'/{topic.strip("/")}'
-        if bag.topics.get(name) != PAYLOAD:
-            there = ', '.join(bag.of_type(PAYLOAD)) or 'none'
+        if bag.topics.get(name) not in PAYLOAD_TYPES:
+            there = ', '.join(bag.payload_topics()) or 'none'
             raise SequenceError(f'bag {path} has no payloads on {name}; topics with payloads: '
                                 f'{there}')
         for _, log_ns, wire in bag.messages([name]):
-            yield log_ns, _payload(wire)
+            yield log_ns, _payload(bag.topics[name], wire)
 
 
 def payload_schemas() -> dict[str, str]:
@@ -208,8 +219,9 @@ class BagRecorder:
     Writes messages to a rosbag2 (MCAP), from any thread; the bag appears on ``close``.
 
     Log times ascend: a message whose stamp does not follow the last one is logged one
-    nanosecond after it, so that a bag reads in the order in which it was written. The .msg
-    texts of the payloads go into the metadata: a recording explains itself, years later too.
+    nanosecond after it, so that a bag reads in the order in which it was written. Payloads are
+    written as messages of their own types, and the .msg texts with their comments go into the
+    metadata: a recording explains itself, years later too.
 
     Raises
     ------
@@ -228,10 +240,20 @@ class BagRecorder:
         self._last_ns = -1
 
     def write(self, topic: str, message_type: str, stamp_ns: int, cdr: bytes) -> None:
-        """Write one message in CDR; raises SequenceError once the recorder is closed."""
+        """
+        Write one message in CDR, as it goes over the wire.
+
+        Raises
+        ------
+        SequenceError
+            The recorder is closed, or a payload is wrapped in something else.
+
+        """
         with self._lock:
             if self._writer is None:
                 raise SequenceError(f'{topic}: the recording is closed')
+            if message_type == WIRE_TYPE and bag_type(topic) != WIRE_TYPE:
+                message_type, cdr = bag_type(topic), _payload(message_type, cdr)
             self._last_ns = max(stamp_ns, self._last_ns + 1)
             self._writer.write(f'/{topic.strip("/")}', message_type, self._last_ns, cdr)
 

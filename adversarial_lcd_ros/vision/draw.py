@@ -126,13 +126,54 @@ def draw_attack(query: NDArray[np.uint8], clean: MultiTierGraph, match: NDArray[
     flips = clean.flips_to(perturbed)
     panels = [('query', _panel(query, clean)), ('match', _panel(match, match_graph)),
               ('attacked graph', _panel(query, perturbed, flips))]
+    return _side_by_side(panels, [(caption, _INK)] if caption else [])
+
+
+def draw_decision(query: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayLike | None,
+                  match: NDArray[np.uint8] | None, verdict: str, why: str, *,
+                  is_loop: bool) -> NDArray[np.uint8]:
+    """
+    Return a frame with its graph, the keyframe it was matched with beside it, and the verdict.
+
+    Parameters
+    ----------
+    query : uint8, (h, w, 3) BGR or (h, w) grey
+    graph : MultiTierGraph
+        As the detector got it.
+    flips : int, (k, 2), or None
+        Pairs that an attacker has flipped, drawn red; None where nobody knows.
+    match : uint8, (h, w, 3) BGR or (h, w) grey, or None
+        None where there was no candidate, or its picture is not at hand.
+    verdict, why : str
+        Two lines below; the first in a colour of its own for a loop.
+    is_loop : bool
+
+    Returns
+    -------
+    uint8, (450, 958, 3)
+        BGR.
+
+    Raises
+    ------
+    GraphError
+        Image and graph differ in size, or a flip names a node that the graph has not.
+
+    """
+    blank = np.full((_PANEL_HEIGHT, _PANEL_WIDTH, 3), _PAPER, np.uint8)
+    panels = [('frame, with the graph that the detector got', _panel(query, graph, flips)),
+              ('best matching keyframe', blank if match is None else _panel(match, None))]
+    return _side_by_side(panels, [(verdict, _OBJECT if is_loop else _INK), (why, _INK)])
+
+
+def _side_by_side(panels: Sequence[tuple[str, NDArray[np.uint8]]],
+                  lines: Sequence[tuple[str, Colour]]) -> NDArray[np.uint8]:
+    """Return panels under their titles, and lines of text below them all."""
     gap = np.full((_TEXT_HEIGHT + _PANEL_HEIGHT, _PANEL_GAP, 3), _PAPER, np.uint8)
     columns = [gap]
     for title, panel in panels:
         columns += [np.vstack([_strip(title, _PANEL_WIDTH), panel]), gap]
     rows = [np.hstack(columns[1:-1])]
-    if caption:
-        rows.append(_strip(caption, rows[0].shape[1]))
+    rows += [_strip(text, rows[0].shape[1], colour) for text, colour in lines]
     return np.asarray(np.vstack(rows), np.uint8)
 
 
@@ -146,7 +187,7 @@ def _resized(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.ui
 
 
 def _panel(image: NDArray[np.uint8], graph: MultiTierGraph | None,
-           flips: NDArray[np.uint32] | None = None) -> NDArray[np.uint8]:
+           flips: ArrayLike | None = None) -> NDArray[np.uint8]:
     """Return a picture that fits a panel, centred on paper."""
     height, width = image.shape[:2]
     scale = min(_PANEL_WIDTH / width, _PANEL_HEIGHT / height)
@@ -241,11 +282,11 @@ def _draw_sample(strip: NDArray[np.uint8], shape: str, colour: Colour, x: int, y
         _segments(strip, _dashes(*ends) if shape == 'dashes' else ends[None], colour, thickness)
 
 
-def _strip(text: str, width: int) -> NDArray[np.uint8]:
+def _strip(text: str, width: int, colour: Colour = _INK) -> NDArray[np.uint8]:
     """Return a strip of paper with a line of text that is made to fit."""
     strip = np.full((_TEXT_HEIGHT, width, 3), _PAPER, np.uint8)
     size = 0.5
     needed = cv2.getTextSize(text, _FONT, size, 1)[0][0]
     size *= min(1.0, (width - 20) / max(needed, 1))
-    cv2.putText(strip, text, (10, 20), _FONT, size, _INK, 1, cv2.LINE_AA)
+    cv2.putText(strip, text, (10, 20), _FONT, size, colour, 1, cv2.LINE_AA)
     return strip

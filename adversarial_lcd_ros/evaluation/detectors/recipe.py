@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from adversarial_lcd_ros.config import BuilderConfig, Config, LabelConfig, LcdConfig
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.evaluation.recipes import load_yaml
 from adversarial_lcd_ros.registry import TARGETS
 
@@ -90,7 +90,8 @@ def recipe_sequences(name: str, data: Path, choices: Choices) -> list[TargetSequ
             raise ConfigError(f'recipe {path}: {entry!r} is no sequence with a source')
         unknown = sorted(set(entry) - set(_KEYS))
         if unknown:
-            raise ConfigError(f'recipe {path}: unknown key {", ".join(unknown)}; there are: '
+            raise ConfigError(f'recipe {path}: unknown key '
+                              f'{with_suggestions(unknown, _KEYS)}; there are: '
                               f'{", ".join(_KEYS)}')
     return [_sequence(str(data / entry['source']), entry, choices) for entry in entries]
 

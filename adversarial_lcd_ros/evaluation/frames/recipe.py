@@ -29,7 +29,7 @@ from adversarial_lcd_ros.config import (
     LcdConfig,
     setting,
 )
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
 from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
@@ -122,7 +122,8 @@ def _check_names(path: Path, what: str, values: Mapping[str, Any],
                  known: tuple[str, ...] | list[str]) -> None:
     unknown = sorted(str(name) for name in values if name not in known)
     if unknown:
-        raise ConfigError(f'recipe {path}, {what}: unknown {", ".join(unknown)}; there are: '
+        raise ConfigError(f'recipe {path}, {what}: unknown '
+                          f'{with_suggestions(unknown, known)}; there are: '
                           f'{", ".join(known)}')
 
 

@@ -118,7 +118,9 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
 def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     sections = {'lcd': asdict(setup.lcd),
                 'bag_replay': {**asdict(setup.replay), 'bag': str(bag.resolve()),
-                               'record': str(recording.resolve())}}
+                               'record': str(recording.resolve()),
+                               # They are in the bag; the next attack starts from the graphs.
+                               'record_frames': False}}
     if setup.builder:
         sections['graph_builder'] = asdict(setup.builder)
     if setup.attack:

@@ -37,7 +37,6 @@ from adversarial_lcd_ros.sequences.bag_truth import BagTruth
 from adversarial_lcd_ros.sequences.bagfile import (
     COMPRESSED_IMAGE,
     IMAGE,
-    PAYLOAD,
     BagFile,
     is_bag,
 )
@@ -80,7 +79,7 @@ def is_recording(path: Path) -> bool:
 
 def _topics(bag: BagFile) -> dict[str, str]:
     # By the last part of their names: nodes may have a namespace.
-    return {topic.rsplit('/', 1)[-1]: topic for topic in bag.of_type(PAYLOAD)}
+    return {topic.rsplit('/', 1)[-1]: topic for topic in bag.payload_topics()}
 
 
 def read_recording(path: Path) -> Heard:

@@ -10,21 +10,6 @@ from rich.table import Table
 from adversarial_lcd_ros.evaluation import wording
 
 
-def decline_table(summary: Mapping[str, Any]) -> Table:
-    """Return what each attack took, as in the report."""
-    if not wording.is_labelled(summary):
-        return _table(f'Decisions changed on {summary["sequence"]}, which has no ground truth',
-                      wording.decline_rows(summary))
-    title = (f'Decline in balanced accuracy on {summary["sequence"]}: {summary["positives"]} '
-             f'frames with a loop, {summary["negatives"]} at a new place')
-    return _table(title, wording.decline_rows(summary))
-
-
-def figure_table(summary: Mapping[str, Any]) -> Table:
-    """Return the detector's figures before and after, as in the report."""
-    return _table(f'The detector on {summary["sequence"]}', wording.figure_rows(summary))
-
-
 def sweep_table(summary: Mapping[str, Any]) -> Table:
     """Return what each run would be worth by other labels."""
     rows = [{'labels': row['labels'], 'run': row['run'],
