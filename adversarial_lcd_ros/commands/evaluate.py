@@ -178,7 +178,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
         figure_table,
         sweep_table,
     )
-    from adversarial_lcd_ros.evaluation.wording import headline
+    from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
@@ -189,5 +189,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     if 'label_sweep' in summary:
         console.print(sweep_table(summary))
     console.print(headline(summary), soft_wrap=True)
+    if is_labelled(summary):
+        console.print(f'Labels by {summary["told_by"]}.', soft_wrap=True)
     console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
                   soft_wrap=True)

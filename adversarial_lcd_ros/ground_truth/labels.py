@@ -24,10 +24,12 @@ from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.judgement import Judgement, judge_evidence, judge_poses
-from adversarial_lcd_ros.sequences import Trajectory
+from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
 NO_MATCH = -1
+# What told labels, where nothing but ground truth poses did.
+BY_POSES, BY_INDEX, BY_NOTHING = 'poses alone', 'numbers of places', 'no ground truth'
 # The relation of all pairs takes a few bytes a pair: 20,000 frames are about 1.6 GB.
 MAX_FRAMES = 20_000
 
@@ -57,6 +59,9 @@ class FrameLabels:
         The frames 0 .. candidates[i] - 1 are old enough to close a loop with frame i.
     located : bool, (n,)
         A ground truth pose is near the frame.
+    told_by : str
+        What told them, in words: 'co-visibility', 'depth images', 'audit', or one of the
+        constants above.
 
     """
 
@@ -68,6 +73,7 @@ class FrameLabels:
     scaled: NDArray[np.bool_]
     candidates: NDArray[np.int64]
     located: NDArray[np.bool_]
+    told_by: str = BY_POSES
 
     @cached_property
     def names(self) -> list[str]:
@@ -131,8 +137,9 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     config : LabelConfig
         Thresholds.
     evidence : Evidence, optional
-        Of these frames. Without it poses alone decide, by the rule "distance" where that is
-        chosen and else by "overlap".
+        Of these frames (``labelling.label_views`` finds it). Without it poses alone decide,
+        whatever the rule: by "distance" where that is chosen and else by "overlap"; ``told_by``
+        of the result says so.
 
     Raises
     ------
@@ -150,7 +157,8 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
     return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
-                       judgement.possible, judgement.far, judgement.scaled, candidates, located)
+                       judgement.possible, judgement.far, judgement.scaled, candidates, located,
+                       BY_INDEX if trajectory.frame_id == PLACE_INDEX else BY_POSES)
 
 
 def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
@@ -160,7 +168,8 @@ def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
     # Views of one value: nothing is known of any pair, and that takes no memory.
     nothing = np.broadcast_to(np.False_, (count, count))
     return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
-                       nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool))
+                       nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool),
+                       BY_NOTHING)
 
 
 def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],

@@ -47,12 +47,15 @@ class FrameSample:
         +1 a loop is there to be found, -1 a new place.
     right : bool, (k, n)
         Frames of the stream that a match may name.
+    told_by : str
+        What told the labels, ``FrameLabels.told_by``.
 
     """
 
     frame: NDArray[np.int64]
     kind: NDArray[np.int8]
     right: NDArray[np.bool_]
+    told_by: str = ''
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,7 @@ def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
     every = np.arange(len(labels.kind))
     right = np.array([labels.is_correct(np.full(len(every), query), every) for query in frame],
                      bool).reshape(len(frame), len(every))
-    return FrameSample(frame, labels.kind[frame], right)
+    return FrameSample(frame, labels.kind[frame], right, labels.told_by)
 
 
 def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],

@@ -161,6 +161,8 @@ def _sequences(cells: Sequence[Summary]) -> list[dict[str, str]]:
     for sequence in sorted({cell['sequence'] for cell in cells}):
         there = [cell for cell in cells if cell['sequence'] == sequence]
         rows.append({'sequence': sequence,
+                     'labels by': ', '.join(sorted({cell['told_by'] for cell in there}))
+                     or 'unknown',
                      'frames a seed': _range(there, 'frames'),
                      'different loops': _range(there, 'different_positives'),
                      'different new places': _range(there, 'different_negatives'),

@@ -66,6 +66,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Summary]:
         ``CELL``; means over the seeds of the figures; and
 
         * ``trained_on``: the detector was trained on frames of the sequence; None if unknown
+        * ``told_by``: what told the labels; empty if unknown
         * ``different_positives``, ``different_negatives``: frames of a kind, repeats once
         * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
@@ -189,7 +190,8 @@ def _summarise(rows: Sequence[Row]) -> Summary:
     positive, negative = _right_before(rows)
     cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
     cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
-                trained_on=rows[0].get('trained_on'), **_different_frames(rows),
+                trained_on=rows[0].get('trained_on'), told_by=rows[0].get('told_by') or '',
+                **_different_frames(rows),
                 decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
                 ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
                 duration_s=math.fsum(row['duration_s'] for row in rows))

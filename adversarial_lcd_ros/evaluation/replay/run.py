@@ -173,7 +173,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
         [graph.node_count for graph in clean.clean],
-        [graph.edge_count for graph in clean.clean]), plan.seed)
+        [graph.edge_count for graph in clean.clean]), plan.seed, told_by=labels.told_by)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:

@@ -57,7 +57,7 @@ class GraphStatistics:
 
 def summarise(sequence: str, records: Sequence[QueryRecord],
               attacks: Mapping[str, AttackConfig | None], graphs: GraphStatistics, seed: int,
-              block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
+              block_s: float = intervals.BLOCK_S, told_by: str = '') -> dict[str, Any]:
     """
     Return the figures of an evaluation (``as_document``: summary.json); undefined ones are None.
 
@@ -75,6 +75,8 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
         Of the whole evaluation; also seeds the bootstrap.
     block_s : float
         Length of the bootstrap's blocks, seconds.
+    told_by : str
+        What told the labels, ``FrameLabels.told_by``.
 
     Raises
     ------
@@ -93,9 +95,9 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
     kinds = Counter(record.kind for record in clean)
     summary = {
         'sequence': sequence, 'labelled': kinds[NO_TRUTH] < len(clean), 'frames': len(clean),
-        'graphs': graphs.count, 'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
-        'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
-        'negatives': kinds['negative'],
+        'told_by': told_by, 'graphs': graphs.count, 'decisions': len(clean),
+        'nodes_mean': graphs.nodes_mean, 'edges_mean': graphs.edges_mean,
+        'positives': kinds['positive'], 'negatives': kinds['negative'],
         'not_scored': {name: kinds[name] for name in FRAME_KINDS[2:]},
         'clean': _run_figures(clean, block, seed),
         'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
