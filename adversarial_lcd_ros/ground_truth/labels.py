@@ -28,6 +28,9 @@ from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
 NO_MATCH = -1
+# What is said of a match: WRONG shares too little, or is too young; ELSEWHERE shares nothing, for
+# certain; of UNTOLD nobody can say whether it is right.
+RIGHT, WRONG, ELSEWHERE, UNTOLD = 'right', 'wrong', 'elsewhere', 'untold'
 # What told labels, where nothing but ground truth poses did.
 BY_POSES, BY_INDEX, BY_NOTHING = 'poses alone', 'numbers of places', 'no ground truth'
 # The relation of all pairs takes a few bytes a pair: 20,000 frames are about 1.6 GB.
@@ -50,8 +53,10 @@ class FrameLabels:
     possible : bool, (n, n)
         Pairs that a loop closure may rightly name: the views share enough.
     elsewhere : bool, (n, n)
-        Pairs that it may certainly not: the views share nothing. What is neither possible nor
-        elsewhere cannot be told.
+        Pairs that it may certainly not: the views share nothing.
+    wrong : bool, (n, n)
+        Pairs that it may not: elsewhere, and by poses alone also those that share too little.
+        What is neither possible nor wrong cannot be told.
     scaled : bool, (n, n)
         Pairs that are a change of scale: one view holds the other as a small part. Where that
         is shown, they are possible, too.
@@ -70,6 +75,7 @@ class FrameLabels:
     relation: NDArray[np.int8]
     possible: NDArray[np.bool_]
     elsewhere: NDArray[np.bool_]
+    wrong: NDArray[np.bool_]
     scaled: NDArray[np.bool_]
     candidates: NDArray[np.int64]
     located: NDArray[np.bool_]
@@ -109,10 +115,25 @@ class FrameLabels:
             Frame indices; NO_MATCH where the detector named none.
 
         """
+        return np.asarray(self.judge(query, match) == RIGHT)
+
+    def judge(self, query: ArrayLike, match: ArrayLike) -> NDArray[np.str_]:
+        """
+        Return what is said of matches: RIGHT, WRONG, ELSEWHERE, UNTOLD, or '' where none is named.
+
+        Parameters
+        ----------
+        query, match : int, (k,)
+            As for ``is_correct``.
+
+        """
         queries, matches = np.asarray(query, np.int64), np.asarray(match, np.int64)
-        old_enough = (matches >= 0) & (matches < self.candidates[queries])
-        right: NDArray[np.bool_] = old_enough & self.possible[queries, np.maximum(matches, 0)]
-        return right
+        named = np.maximum(matches, 0)
+        old_enough = matches < self.candidates[queries]
+        return np.select(
+            [matches < 0, self.elsewhere[queries, named],
+             self.wrong[queries, named] | (self.located[queries] & ~old_enough),
+             self.possible[queries, named]], ['', ELSEWHERE, WRONG, RIGHT], UNTOLD)
 
 
 def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
@@ -157,7 +178,8 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
     return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
-                       judgement.possible, judgement.far, judgement.scaled, candidates, located,
+                       judgement.possible, judgement.far, judgement.wrong, judgement.scaled,
+                       candidates, located,
                        BY_INDEX if trajectory.frame_id == PLACE_INDEX else BY_POSES)
 
 
@@ -168,7 +190,7 @@ def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
     # Views of one value: nothing is known of any pair, and that takes no memory.
     nothing = np.broadcast_to(np.False_, (count, count))
     return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
-                       nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool),
+                       nothing, nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool),
                        BY_NOTHING)
 
 

@@ -220,6 +220,7 @@ def _figures(summary: Summary) -> dict[str, str]:
 def _counts(summary: Summary) -> dict[str, str]:
     return {'suppressed': f'{_count(summary["suppressed"])} of {_count(summary["found_clean"])}',
             'invented': f'{_count(summary["invented"])} of {_count(summary["silent_clean"])}',
+            'certainly elsewhere': _count(summary['invented_elsewhere']),
             'unattackable': f'{_count(summary["unattackable"])} of {_count(summary["frames"])}',
             'edits': _count(summary['edits_mean']), 'queries': _count(summary['queries_mean'])}
 

@@ -28,11 +28,11 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, is_yardstick, method_of
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
+from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, UNTOLD_MATCH, right
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
-KIND, SCHEMA = 'frames', 5  # of summary.json
+KIND, SCHEMA = 'frames', 6  # of summary.json
 
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', *COLUMNS, 'oracle', 'mode', 'ratio', 'edits',
@@ -41,8 +41,9 @@ ATTACK = CELL[1:]
 # What a row need not say.
 USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
-          'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
-          'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
+          'decline_pp', 'suppressed', 'invented', 'invented_elsewhere', 'left_out',
+          'unattackable', 'frames', 'positives', 'negatives', 'nodes_mean', 'edges_mean',
+          'edits_mean', 'queries_mean', 'success_rate')
 _KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
@@ -159,6 +160,12 @@ def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
     return np.array([_is_right(frame[which], row) for frame in row['frame_results']], bool)
 
 
+def frame_untold(row: Row) -> NDArray[np.bool_]:
+    """Return which frames are in no figure: a match, clean or attacked, cannot be told, (n,)."""
+    return np.array([UNTOLD_MATCH in (frame['clean'], frame['attacked'])
+                     for frame in row['frame_results']], bool)
+
+
 def _cell_key(row: Row) -> tuple[Hashable, ...]:
     missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
                if name not in row and name not in ('asked_target', *USUAL)]
@@ -226,7 +233,7 @@ def _kinds(row: Row) -> NDArray[np.int8]:
 
 
 def _is_right(value: Any, row: Row) -> bool:
-    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', ''):
+    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', UNTOLD_MATCH, ''):
         return bool(right(np.array(value)))
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
@@ -247,7 +254,7 @@ def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
                                   'stamp')
         lost = frame_right(row, 'clean').astype(np.int64) - frame_right(row, 'attacked')
         for index, kind in enumerate((POSITIVE, NEGATIVE)):
-            member = _kinds(row) == kind
+            member = (_kinds(row) == kind) & ~frame_untold(row)
             size[index, place] += member
             total[index, place] += np.where(member, lost, 0)
     interval = intervals.class_mean_interval(
@@ -288,5 +295,5 @@ def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...]
                         'balanced_attacked', 'edits_mean', 'queries_mean', 'nodes_mean',
                         'success_rate')},
         **{name: math.fsum(cell[name] for cell in cells)
-           for name in ('suppressed', 'invented', 'unattackable', 'frames', 'found_clean',
-                        'silent_clean')}}
+           for name in ('suppressed', 'invented', 'invented_elsewhere', 'left_out',
+                        'unattackable', 'frames', 'found_clean', 'silent_clean')}}

@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
     first_closure_latency_s,
     measure,
     right,
+    told_kind,
 )
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
@@ -31,11 +32,14 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     runs_of,
 )
 from adversarial_lcd_ros.evaluation.results import summary_document
+from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, UNTOLD, WRONG
 
-KIND, SCHEMA = 'replay', 2
+KIND, SCHEMA = 'replay', 3
 # What nobody can count without ground truth.
 _NEED_LABELS = ('positives', 'negatives', 'tp', 'fn', 'fp', 'tn', 'wrong_matches', 'suppressed',
-                'diverted', 'invented', 'regained', 'withdrawn', 'wrong_closures_unscored')
+                'diverted', 'invented', 'regained', 'withdrawn', 'left_out', 'untold_matches',
+                'declared_elsewhere', 'invented_elsewhere', 'diverted_elsewhere',
+                'wrong_closures_unscored')
 
 
 @dataclass(frozen=True)
@@ -148,7 +152,8 @@ def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
 def run_metrics(run: Sequence[QueryRecord]) -> Metrics:
     """Return the figures of the records of one run."""
     return measure(column(run, 'label'), column(run, 'is_loop'),
-                   column(run, 'probability').astype(np.float64), column(run, 'match_correct'))
+                   column(run, 'probability').astype(np.float64), column(run, 'match_correct'),
+                   column(run, 'match_is') != UNTOLD)
 
 
 def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
@@ -157,11 +162,14 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
         **run_metrics(run).as_dict(),
         'loops_declared': sum(record.is_loop for record in run),
         'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
-            kind, right(outcome), block, seed),
+            told_kind(kind, outcome), right(outcome), block, seed),
+        # Joins that certainly share nothing, on whatever frame.
+        'declared_elsewhere': sum(record.is_loop and record.match_is == ELSEWHERE
+                                  for record in run),
         # Outside the scored frames a closure with another place is still wrong.
         'wrong_closures_unscored': sum(
-            record.is_loop and not record.match_correct and not record.outcome
-            and record.kind != 'no_ground_truth' for record in run),
+            record.is_loop and record.match_is in (WRONG, ELSEWHERE) and not record.outcome
+            for record in run),
         'first_closure_latency_s': first_closure_latency_s(
             column(run, 'stamp_ns'), kind, outcome)}
 
@@ -180,8 +188,10 @@ def _attack_figures(name: str, config: AttackConfig | None, clean: Sequence[Quer
     return {
         'name': name, **settings, 'decisions': len(run), **_effort(run),
         **_run_figures(run, block, seed), **change, **_changes(clean, run),
-        'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
-                                                    seed)}
+        **{f'{what}_elsewhere': sum(record.effect == what and record.match_is == ELSEWHERE
+                                    for record in run) for what in ('invented', 'diverted')},
+        'decline_ci95': intervals.decline_interval(
+            told_kind(kind, before, after), right(before), right(after), block, seed)}
 
 
 def _changes(clean: Sequence[QueryRecord], run: Sequence[QueryRecord]) -> dict[str, Any]:
