@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.replay.offline import run_offline
     from adversarial_lcd_ros.graph import MultiTierGraph
     from adversarial_lcd_ros.graph_sequences.opening import open_graphs
+    from adversarial_lcd_ros.ground_truth.labelling import label_graphs
     from adversarial_lcd_ros.ground_truth.labels import label_frames
     from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
     from adversarial_lcd_ros.sequences import open_sequence
@@ -35,12 +36,14 @@ _HOME = {
     'LcdConfig': 'config', 'measure': 'evaluation.metrics',
     'run_offline': 'evaluation.replay.offline', 'MultiTierGraph': 'graph',
     'open_graphs': 'graph_sequences.opening', 'label_frames': 'ground_truth.labels',
+    'label_graphs': 'ground_truth.labelling',
     'LoopClosureDetector': 'lcd.detector', 'open_sequence': 'sequences',
     'GraphBuilder': 'vision.builder'}
 
 __all__ = ['AttackConfig', 'AttackResult', 'Attacker', 'BuilderConfig', 'GraphBuilder',
            'LabelConfig', 'LcdConfig', 'LoopClosureDetector', 'MultiTierGraph', '__version__',
-           'label_frames', 'measure', 'open_graphs', 'open_sequence', 'run_offline']
+           'label_frames', 'label_graphs', 'measure', 'open_graphs', 'open_sequence',
+           'run_offline']
 
 
 def __getattr__(name: str) -> Any:

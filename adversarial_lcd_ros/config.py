@@ -300,10 +300,11 @@ class LabelConfig(Config):
     title: ClassVar[str] = 'labels'
 
     rule: str = setting(
-        'overlap', 'How two views are judged: by co-visibility where it lies beside the '
-        'recording, else by an audit (auto); by what can be shown in the pictures under the true '
-        'poses (audit); or from poses alone, by the overlap that they may have (overlap) or by '
-        'distance and angle (distance).', choices=('auto', 'audit', 'overlap', 'distance'))
+        'auto', 'How two views are judged: by co-visibility or depth images where they lie '
+        'beside the recording, else by an audit (auto); by what can be shown in the pictures '
+        'under the true poses (audit); or from poses alone, by the overlap that they may have '
+        '(overlap) or by distance and angle (distance).',
+        choices=('auto', 'audit', 'overlap', 'distance'))
     loop_share: float = setting(
         0.5, 'Auto: least share of a loop, of the surface of either view, that the other sees.',
         low=0.0, high=1.0)

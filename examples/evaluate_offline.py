@@ -6,7 +6,7 @@ from adversarial_lcd_ros import (
     AttackConfig,
     LabelConfig,
     LcdConfig,
-    label_frames,
+    label_graphs,
     measure,
     open_graphs,
     run_offline,
@@ -14,7 +14,7 @@ from adversarial_lcd_ros import (
 
 tour = open_graphs('bags/flat_tour@0:0.5')
 stamps = [graph.stamp_ns for graph in tour.graphs]
-labels = label_frames(tour.trajectory, stamps, tour.image_size, LabelConfig())
+labels = label_graphs(tour.graphs, tour.trajectory, tour.source, LabelConfig())
 for attack in (None, AttackConfig(search='recall')):
     decisions = run_offline(tour.graphs, LcdConfig(), attack)[0].decisions
     match = [stamps.index(decision.match_stamp_ns) if decision.is_loop else -1

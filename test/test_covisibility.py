@@ -98,14 +98,15 @@ def test_covisibility_beside_a_sequence_wins_over_its_poses(tmp_path):
     poses = standing(20)
     graphs = [MultiTierGraph(int(stamp), 'camera', number, *SIZE)
               for number, stamp in enumerate(poses.stamp_ns)]
-    config = LabelConfig(rule='auto', min_gap_s=2.0)
+    config = LabelConfig(min_gap_s=2.0)
     write(tmp_path / 'covisibility.npz', np.zeros((20, 20)))
     assert find_covisibility(tmp_path) == tmp_path / 'covisibility.npz'
     assert find_covisibility(tmp_path / 'walk.bag') == tmp_path / 'covisibility.npz'
-    assert label_graphs(graphs, poses, tmp_path, config).count('negative') == 18
+    exact = label_graphs(graphs, poses, tmp_path, config)
+    assert (exact.count('negative'), exact.told_by) == (18, 'co-visibility')
     by_poses = label_graphs(graphs, poses, tmp_path,
                             LabelConfig(min_gap_s=2.0, rule='overlap'))
-    assert by_poses.count('negative') == 0
+    assert (by_poses.count('negative'), by_poses.told_by) == (0, 'poses alone')
     assert find_covisibility(Path('/nowhere')) is None
 
 

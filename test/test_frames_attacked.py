@@ -32,7 +32,8 @@ CELLS = [Cell('stepwise', replace(ATTACK, perturbation='random_flip'), 'wl', 'wl
 
 def labels_of(kind):
     kind = np.array(kind, np.int8)
-    return SimpleNamespace(kind=kind, is_correct=lambda query, match: match < query - 1)
+    return SimpleNamespace(kind=kind, told_by='audit', judge=lambda query, match: np.where(
+        match < query - 1, 'right', 'untold'))
 
 
 def stream(count=8, changed=3):
@@ -48,7 +49,8 @@ def lcd(lcd_model):
     return LcdConfig(model=lcd_model, min_gap_s=2.0, map_window=0)
 
 
-SAMPLE = FrameSample(np.array([3, 5, 6]), np.array([-1, 1, 1], np.int8), np.eye(8)[[3, 1, 2]] > 0)
+SAMPLE = FrameSample(np.array([3, 5, 6]), np.array([-1, 1, 1], np.int8),
+                     np.where(np.eye(8)[[3, 1, 2]] > 0, 'right', 'elsewhere'))
 
 
 @given(st.lists(st.sampled_from([-1, 0, 1]), min_size=1, max_size=80), st.integers(1, 6),
@@ -59,7 +61,7 @@ def test_each_kind_gives_its_frames_once(kind, per_kind, seed):
     assert (sample.kind == np.array(kind)[sample.frame]).all()
     for value in (-1, 1):
         assert (sample.kind == value).sum() == min(per_kind, kind.count(value))
-    assert sample.right.shape == (len(sample.frame), len(kind))
+    assert sample.match_is.shape == (len(sample.frame), len(kind))
 
 
 @given(st.integers(1, 5), st.integers(1, 8), st.integers(0, 50))
@@ -73,7 +75,8 @@ def test_seeds_draw_other_frames_until_all_are_used(per_kind, seeds, first):
 
 def test_a_sample_knows_the_right_matches():
     sample = sample_frames(labels_of([0, 0, 0, 1, -1]), 1, 0)
-    assert sample.right.sum(axis=1).tolist() == [2, 3]
+    assert (sample.match_is == 'right').sum(axis=1).tolist() == [2, 3]
+    assert sample.told_by == 'audit'
 
 
 def test_frames_are_judged_against_the_clean_graphs_before_them(lcd):
@@ -90,8 +93,7 @@ def test_frames_are_judged_against_the_clean_graphs_before_them(lcd):
             graphs[frame], lambda graph, lcd=detector: lcd.answer(LcdQuery(0, graph)))
         assert result.result == alone
     assert results[1].clean.match_stamp_ns == graphs[1].stamp_ns
-    assert results[1].clean_right
-    assert not results[0].clean_right
+    assert [result.clean_is for result in results[:2]] == ['elsewhere', 'right']
 
 
 def test_cells_do_not_see_each_other(lcd):

@@ -78,12 +78,13 @@ def results():
     spent = AttackResult(clean, flipped, 'success', 'decision changed', 3, 9, 5, -1.0, 2.0,
                          tuple(float(k) for k in range(20)))
     skipped = AttackResult(clean, clean, 'skipped', 'edit budget below one')
-    cases = [(1, True, False, True, False, spent), (1, True, True, True, False, spent),
-             (-1, False, False, False, False, spent), (-1, True, True, False, False, skipped)]
-    return [FrameResult(kind, decision(k, before, 0), decision(k, after, 0), right, still,
+    right, far = 'right', 'elsewhere'
+    cases = [(1, True, False, right, far, spent), (1, True, True, right, far, spent),
+             (-1, False, False, far, far, spent), (-1, True, True, far, far, skipped)]
+    return [FrameResult(kind, decision(k, before, 0), decision(k, after, 0), was, now,
                         replace(attack, clean=replace(attack.clean, stamp_ns=k)),
                         0.5, 0.25, 0.125)
-            for k, (kind, before, after, right, still, attack) in enumerate(cases)]
+            for k, (kind, before, after, was, now, attack) in enumerate(cases)]
 
 
 def test_a_row_tells_what_happened():

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.ground_truth.labels import label_frames
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 SIZE = (640, 480)
-BASE = LabelConfig(min_gap_s=5.0)
+BASE = LabelConfig(rule='overlap', min_gap_s=5.0)
 # A look around, and the same once more; then elsewhere.
 YAW = [*range(0, 360, 30), *range(0, 180, 30)]
 

@@ -8,7 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.ground_truth.labels import NO_MATCH, label_frames, relation
+from adversarial_lcd_ros.ground_truth.labels import (
+    BY_INDEX,
+    BY_POSES,
+    NO_MATCH,
+    label_frames,
+    relation,
+)
 from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 
@@ -101,11 +107,11 @@ def test_quaternion_that_is_no_rotation_is_named():
 
 
 def test_loop_needs_the_camera_to_have_looked_elsewhere():
-    still = relation(path([0.0] * 30), SIZE, LabelConfig(min_gap_s=5.0))
+    still = relation(path([0.0] * 30), SIZE, LabelConfig(rule='overlap', min_gap_s=5.0))
     assert not still.any()
     # Away for frames 10 to 19, then back.
     back = relation(path([0.0] * 10 + [180.0] * 10 + [0.0] * 10), SIZE,
-                    LabelConfig(min_gap_s=5.0))
+                    LabelConfig(rule='overlap', min_gap_s=5.0))
     assert back[25, 3] == back[3, 25] == 1
     assert back[9, 0] == 0
     assert back[29, 20] == 0
@@ -138,6 +144,7 @@ def test_ground_truth_by_index():
     index = np.r_[np.arange(30), np.arange(30)].astype(float)  # two walks
     poses = replace(path(np.zeros(60), x_m=index), frame_id='place_index')
     labels = label_frames(poses, poses.stamp_ns, SIZE, LabelConfig(negative_index=5))
+    assert labels.told_by == BY_INDEX
     assert labels.relation[40, 10] == 1
     assert labels.relation[40, 25] == -1
     assert (labels.kind[30:] == 1).all()
@@ -147,7 +154,7 @@ def test_ground_truth_by_index():
 def test_kinds_of_frames():
     yaw = [0.0] * 10 + [180.0] * 10 + [0.0] * 10 + [90.0] * 5
     poses = path(yaw)
-    labels = label_frames(poses, poses.stamp_ns, SIZE, LabelConfig(min_gap_s=5.0))
+    labels = label_frames(poses, poses.stamp_ns, SIZE, LabelConfig(rule='overlap', min_gap_s=5.0))
     assert labels.names[:5] == ['no_candidate'] * 5
     assert labels.names[5:10] == ['between'] * 5  # the camera never left
     assert labels.names[10:15] == ['negative'] * 5
@@ -159,7 +166,7 @@ def test_kinds_of_frames():
 def test_right_and_wrong_matches():
     # Frame 3 has turned by 28 degrees: enough in common to be named, too little for a loop.
     poses = path([0, 0, 0, 28, *[180] * 5, 0], period_s=2.0)
-    labels = label_frames(poses, poses.stamp_ns, SIZE, LabelConfig(min_gap_s=4.0))
+    labels = label_frames(poses, poses.stamp_ns, SIZE, LabelConfig(rule='overlap', min_gap_s=4.0))
     assert labels.kind[9] == 1
     assert labels.relation[9, 3] == 0
     assert labels.is_correct([9] * 5, [0, 3, 5, 8, NO_MATCH]).tolist() == [
@@ -170,19 +177,20 @@ def test_holes_in_the_ground_truth_cost_their_frames_only():
     poses = path([0.0] * 10 + [180.0] * 10 + [0.0] * 10)
     known = np.r_[0:15, 17:30]
     partial = Poses(poses.stamp_ns[known], poses.position[known], poses.quaternion[known])
-    labels = label_frames(partial, poses.stamp_ns, SIZE, LabelConfig(min_gap_s=5.0))
+    labels = label_frames(partial, poses.stamp_ns, SIZE,
+                          LabelConfig(rule='overlap', min_gap_s=5.0))
     assert [labels.names[i] for i in (15, 16)] == ['no_ground_truth'] * 2
     assert not labels.relation[15].any()
     assert labels.names[25] == 'positive'
     with pytest.raises(EvaluationError, match='none of 30 frames'):
         label_frames(replace(poses, stamp_ns=poses.stamp_ns + 10**15), poses.stamp_ns, SIZE,
-                     LabelConfig())
+                     LabelConfig(rule='overlap'))
 
 
 def test_stamps_must_ascend():
     poses = path([0.0, 1.0])
     with pytest.raises(EvaluationError, match='frame 1 is not later'):
-        label_frames(poses, [5, 5], SIZE, LabelConfig())
+        label_frames(poses, [5, 5], SIZE, LabelConfig(rule='overlap'))
 
 
 def test_contradicting_thresholds_are_refused():
@@ -193,7 +201,7 @@ def test_contradicting_thresholds_are_refused():
 def test_pairs_are_balanced_distinct_and_spread_over_time():
     rng = np.random.default_rng(0)
     poses = path(np.r_[np.zeros(100), np.full(50, 180.0), np.zeros(100)], period_s=0.5)
-    pairs = relation(poses, SIZE, LabelConfig())
+    pairs = relation(poses, SIZE, LabelConfig(rule='overlap'))
     sample = sample_pairs(pairs, rng, 80)
     assert sample.is_loop.sum() == 80
     assert len(sample.query) == 160
@@ -217,5 +225,7 @@ def test_real_sequences(shared_data, name, positives, negatives):
     truth = np.loadtxt(folder / 'groundtruth.txt')
     seconds = np.loadtxt(folder / 'rgb.txt', usecols=0)
     poses = Poses(np.round(truth[:, 0] * 1e9).astype(np.int64), truth[:, 1:4], truth[:, 4:8])
-    labels = label_frames(poses, np.round(seconds * 1e9).astype(np.int64), SIZE, LabelConfig())
+    labels = label_frames(poses, np.round(seconds * 1e9).astype(np.int64), SIZE,
+                          LabelConfig(rule='overlap'))
+    assert labels.told_by == BY_POSES
     assert (labels.count('positive'), labels.count('negative')) == (positives, negatives)

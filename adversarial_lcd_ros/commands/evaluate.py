@@ -176,7 +176,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
     from adversarial_lcd_ros.evaluation.replay.tables import sweep_table
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
-    from adversarial_lcd_ros.evaluation.wording import headline
+    from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
     if options.json:
         print_json({'folder': str(folder), **as_document(summary)})
@@ -186,5 +186,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     if 'label_sweep' in summary:
         console.print(sweep_table(summary))
     console.print(headline(summary))
+    if is_labelled(summary):
+        console.print(f'Labels by {summary["told_by"]}.', soft_wrap=True)
     console.print(f'{summary["duration_s"]:.0f} s; report: {folder / "report.html"}',
                   soft_wrap=True)

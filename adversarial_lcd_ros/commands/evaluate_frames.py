@@ -155,7 +155,7 @@ def _write_setup(folder: Path, options: Namespace, streams: list[Stream],
         {'cells': cells, 'sequences': [
             {'source': stream.graphs.source, 'name': stream.name, 'nodes': stream.nodes,
              'nodes_mean': stream.nodes_mean, 'frames': len(stream.labels.kind),
-             'digest': stream.digest} for stream in streams]})
+             'labels_by': stream.labels.told_by, 'digest': stream.digest} for stream in streams]})
     # Rows name the releases that made them; a later run must not take away what that means.
     results.write_json(f'{Path(ENVIRONMENT).stem}-{versions_digest()}.json', environment())
 
@@ -164,7 +164,8 @@ def _announce(options: Namespace, streams: list[Stream], experiment: Experiment,
               others: int) -> None:
     for stream in {stream.name: stream for stream in streams}.values():
         tell(f'{stream.name}: {stream.labels.count("positive")} frames with a loop, '
-             f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}')
+             f'{stream.labels.count("negative")} at new places, of {len(stream.labels.kind)}; '
+             f'labels by {stream.labels.told_by}')
     if others:
         tell('cells finished earlier that are of other settings, graphs, models or code: '
              f'{others}; kept, but not in the report')

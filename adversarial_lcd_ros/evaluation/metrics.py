@@ -5,7 +5,8 @@ Every scored frame has one outcome. ``TP``: a loop is there and a right match wa
 ``FN``: a loop is there and nothing was declared. ``WM``, wrong match: a loop is there but the
 declared match is another place. ``FP``: no loop is there but one was declared. ``TN``: rightly
 silent. A wrong match is a missed loop (it counts among the false negatives) and also a false
-alarm (it counts against precision).
+alarm (it counts against precision). ``UM``, untold match: one was declared with a match of which
+nobody can say whether it is right; the frame is in no figure of that run.
 
 The figure of a decline is balanced accuracy. The paper quotes accuracy on balanced pairs; in a
 replay the classes are what they are (240 loops to 61 new places on flat_tour).
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.metrics import average_precision_score, matthews_corrcoef, precision_recall_curve
+from sklearn.metrics import matthews_corrcoef, precision_recall_curve
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
@@ -26,6 +27,8 @@ from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 Outcomes = NDArray[np.str_]
 # What ground truth says of a frame, in words; only the first two are scored.
 FRAME_KINDS = ('positive', 'negative', 'scale', 'between', 'no_candidate', 'no_ground_truth')
+# The outcome of a frame whose declared match cannot be told.
+UNTOLD_MATCH = 'UM'
 # What an attack did to a frame, by its outcomes before and after.
 EFFECTS = {('TP', 'FN'): 'suppressed', ('TP', 'WM'): 'diverted', ('TN', 'FP'): 'invented',
            ('FN', 'TP'): 'regained', ('WM', 'TP'): 'regained', ('FP', 'TN'): 'withdrawn'}
@@ -53,14 +56,16 @@ class Metrics:
         Outcomes; fn includes wrong matches.
     wrong_matches : int
         Loops that were declared with another place.
+    untold_matches : int
+        Frames left out of all figures below: declared with a match that cannot be told.
     accuracy : float or None
-        (tp + tn) / (positives + negatives); None without scored frames.
+        (tp + tn) / (tp + fn + fp + tn); None without scored frames.
     balanced_accuracy : float or None
         Mean of recall and specificity; None if a class is empty.
     precision : float or None
         tp / (tp + fp + wrong_matches); None if nothing was declared.
     recall, specificity : float or None
-        tp / positives, tn / negatives; None without such frames.
+        tp / (tp + fn), tn / (tn + fp); None without such frames.
     recall_at_100_precision : float or None
         Largest recall of a threshold at which no declaration is wrong; 0 if there is none.
     average_precision : float or None
@@ -79,6 +84,7 @@ class Metrics:
     fp: int
     tn: int
     wrong_matches: int
+    untold_matches: int
     accuracy: float | None
     balanced_accuracy: float | None
     precision: float | None
@@ -111,6 +117,9 @@ class Effect:
         Loops declared after where there is none (TN to FP).
     regained, withdrawn : int
         The opposite of suppressed and of invented: what the attack repaired by accident.
+    left_out : int
+        Frames in no other figure here: of their match before, or after, nobody can say whether it
+        is right.
     accuracy_decline_pp, decline_pp : float or None
         Accuracy and balanced accuracy before minus after, percentage points; positive: lost.
 
@@ -121,14 +130,16 @@ class Effect:
     invented: int
     regained: int
     withdrawn: int
+    left_out: int
     accuracy_decline_pp: float | None
     decline_pp: float | None
 
 
 def outcomes(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
-             match_correct: NDArray[np.bool_]) -> Outcomes:
+             match_correct: NDArray[np.bool_],
+             match_told: NDArray[np.bool_] | None = None) -> Outcomes:
     """
-    Return the outcome of every frame, shape (n,): TP, FN, WM, FP, TN, or '' if not scored.
+    Return the outcome of every frame, shape (n,): TP, FN, WM, FP, TN, UM, or '' if not scored.
 
     Parameters
     ----------
@@ -138,15 +149,24 @@ def outcomes(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
         The detector declared a loop.
     match_correct : bool, (n,)
         The match it named, declared or not, is right.
+    match_told : bool, (n,), optional
+        Whether that can be said at all; without, it can of every match.
 
     """
-    _check_lengths(kind=kind, is_loop=is_loop, match_correct=match_correct)
+    told = np.ones(len(kind), bool) if match_told is None else np.asarray(match_told, bool)
+    _check_lengths(kind=kind, is_loop=is_loop, match_correct=match_correct, match_told=told)
     positive, negative = kind == POSITIVE, kind == NEGATIVE
     declared, right = np.asarray(is_loop, bool), np.asarray(match_correct, bool)
     return np.select(
-        [positive & declared & right, positive & declared, positive,
-         negative & declared, negative],
-        ['TP', 'WM', 'FN', 'FP', 'TN'], '')
+        [(positive | negative) & declared & ~told, positive & declared & right,
+         positive & declared, positive, negative & declared, negative],
+        [UNTOLD_MATCH, 'TP', 'WM', 'FN', 'FP', 'TN'], '')
+
+
+def told_kind(kind: NDArray[np.int8], *outcome: Outcomes) -> NDArray[np.int8]:
+    """Return the kind of every frame, 0 also where a run's match cannot be told."""
+    untold = np.logical_or.reduce([found == UNTOLD_MATCH for found in outcome])
+    return np.where(untold, 0, kind).astype(np.int8)
 
 
 def right(outcome: Outcomes) -> NDArray[np.bool_]:
@@ -155,13 +175,14 @@ def right(outcome: Outcomes) -> NDArray[np.bool_]:
 
 
 def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
-            probability: NDArray[np.float64], match_correct: NDArray[np.bool_]) -> Metrics:
+            probability: NDArray[np.float64], match_correct: NDArray[np.bool_],
+            match_told: NDArray[np.bool_] | None = None) -> Metrics:
     """
     Return the figures of one run; never fails on an empty class.
 
     Parameters
     ----------
-    kind, is_loop, match_correct : (n,)
+    kind, is_loop, match_correct, match_told : (n,)
         As in ``outcomes``.
     probability : float64, (n,)
         The detector's, 0 to 1: orders the decisions for the precision-recall curve.
@@ -175,28 +196,32 @@ def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
     _check_lengths(kind=kind, probability=probability)
     if not np.all((probability >= 0) & (probability <= 1)):
         raise EvaluationError('a probability is not within 0 to 1: the detector is broken')
-    outcome = outcomes(kind, is_loop, match_correct)
+    told = np.ones(len(kind), bool) if match_told is None else np.asarray(match_told, bool)
+    outcome = outcomes(kind, is_loop, match_correct, told)
     count = {name: int((outcome == name).sum()) for name in ('TP', 'WM', 'FN', 'FP', 'TN')}
-    positives, negatives = int((kind == POSITIVE).sum()), int((kind == NEGATIVE).sum())
     declared = count['TP'] + count['WM'] + count['FP']
+    positives = count['TP'] + count['WM'] + count['FN']
+    negatives = count['TN'] + count['FP']
     recall, specificity = _ratio(count['TP'], positives), _ratio(count['TN'], negatives)
     both = recall is not None and specificity is not None
     scored = kind != 0
-    curve = _curve(kind[scored], probability[scored], match_correct[scored])
+    curve = _curve(kind[scored], probability[scored], match_correct[scored], told[scored])
     return Metrics(
-        positives=positives, negatives=negatives, tp=count['TP'], fn=count['FN'] + count['WM'],
+        positives=int((kind == POSITIVE).sum()), negatives=int((kind == NEGATIVE).sum()),
+        tp=count['TP'], fn=count['FN'] + count['WM'],
         fp=count['FP'], tn=count['TN'], wrong_matches=count['WM'],
+        untold_matches=int((outcome == UNTOLD_MATCH).sum()),
         accuracy=_ratio(count['TP'] + count['TN'], positives + negatives),
         balanced_accuracy=balanced_accuracy(kind, outcome),
         precision=_ratio(count['TP'], declared), recall=recall, specificity=specificity,
         recall_at_100_precision=_recall_at_100_precision(curve),
-        average_precision=_average_precision(kind, probability, match_correct),
+        average_precision=_average_precision(curve),
         mcc=_mcc(kind, outcome) if both else None, curve=curve)
 
 
 def balanced_accuracy(kind: NDArray[np.int8], outcome: Outcomes) -> float | None:
     """Return the mean of the shares of right decisions of both kinds; None if one is empty."""
-    correct = right(outcome)
+    correct, kind = right(outcome), told_kind(kind, outcome)
     rates = [_ratio(int(correct[kind == value].sum()), int((kind == value).sum()))
              for value in (POSITIVE, NEGATIVE)]
     known = [rate for rate in rates if rate is not None]
@@ -216,15 +241,17 @@ def effect(kind: NDArray[np.int8], before: Outcomes, after: Outcomes) -> Effect:
 
     """
     _check_lengths(kind=kind, before=before, after=after)
+    told = told_kind(kind, before, after)
+    left_out, kind = int((told != kind).sum()), told
     lost = np.where(right(before), 1, 0) - np.where(right(after), 1, 0)
     by_class = [lost[kind == value] for value in (POSITIVE, NEGATIVE)]
     scored = np.concatenate(by_class)
     return Effect(
-        suppressed=int(((before == 'TP') & (after != 'TP')).sum()),
+        suppressed=int(((kind == POSITIVE) & (before == 'TP') & (after != 'TP')).sum()),
         diverted=int(((before == 'TP') & (after == 'WM')).sum()),
         invented=int(((before == 'TN') & (after == 'FP')).sum()),
         regained=int(((kind == POSITIVE) & (before != 'TP') & (after == 'TP')).sum()),
-        withdrawn=int(((before == 'FP') & (after == 'TN')).sum()),
+        withdrawn=int(((before == 'FP') & (after == 'TN')).sum()), left_out=left_out,
         accuracy_decline_pp=100.0 * float(scored.mean()) if len(scored) else None,
         decline_pp=(50.0 * float(by_class[0].mean() + by_class[1].mean())
                     if all(map(len, by_class)) else None))
@@ -250,24 +277,22 @@ def _ratio(part: int, whole: int) -> float | None:
 
 
 def _curve(kind: NDArray[np.int8], probability: NDArray[np.float64],
-           match_correct: NDArray[np.bool_]) -> Curve | None:
+           match_correct: NDArray[np.bool_], match_told: NDArray[np.bool_]) -> Curve | None:
     # A frame with a wrong match can be no true positive at any threshold: to sklearn it is a
-    # negative. Recall is then of the loops that were matched, and is scaled to all loops.
-    found, share = _findable(kind, match_correct)
-    if share is None:
+    # negative. Recall is then of the loops that were matched, and is scaled to all loops but
+    # those that are declared with a match that cannot be told.
+    positives = int((kind == POSITIVE).sum())
+    if not positives:
         return None
+    found = ((kind == POSITIVE) & match_correct)[match_told]
     if not found.any():  # sklearn warns and answers recall 1
         threshold = np.unique(probability)
         return Curve(threshold, np.zeros(len(threshold)), np.zeros(len(threshold)))
-    precision, recall, threshold = precision_recall_curve(found, probability)
+    precision, recall, threshold = precision_recall_curve(found, probability[match_told])
+    untold = np.sort(probability[(kind == POSITIVE) & ~match_told])
+    declared = len(untold) - np.searchsorted(untold, threshold)
     # sklearn's last point, (1, 0), stands for a threshold at which nothing is declared.
-    return Curve(threshold, precision[:-1], recall[:-1] * share)
-
-
-def _findable(kind: NDArray[np.int8],
-              match_correct: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], float | None]:
-    found: NDArray[np.bool_] = (kind == POSITIVE) & match_correct
-    return found, _ratio(int(found.sum()), int((kind == POSITIVE).sum()))
+    return Curve(threshold, precision[:-1], recall[:-1] * found.sum() / (positives - declared))
 
 
 def _recall_at_100_precision(curve: Curve | None) -> float | None:
@@ -276,16 +301,13 @@ def _recall_at_100_precision(curve: Curve | None) -> float | None:
     return float(curve.recall[curve.precision == 1.0].max(initial=0.0))
 
 
-def _average_precision(kind: NDArray[np.int8], probability: NDArray[np.float64],
-                       match_correct: NDArray[np.bool_]) -> float | None:
-    scored = kind != 0
-    found, share = _findable(kind[scored], match_correct[scored])
-    if not share:
-        return share  # None without positives, 0.0 if none of them is matched rightly
-    return float(average_precision_score(found, probability[scored])) * share
+def _average_precision(curve: Curve | None) -> float | None:
+    if curve is None:
+        return None
+    return float(-(np.diff(curve.recall, append=0.0) * curve.precision).sum())
 
 
 def _mcc(kind: NDArray[np.int8], outcome: Outcomes) -> float:
-    scored = kind != 0
+    scored = told_kind(kind, outcome) != 0
     return float(matthews_corrcoef(kind[scored] == POSITIVE,
                                    np.isin(outcome[scored], ('TP', 'FP'))))

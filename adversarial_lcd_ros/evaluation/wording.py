@@ -217,7 +217,17 @@ def _changes(summary: Mapping[str, Any], attack: Attack) -> str:
     silent = summary['clean']['tn']
     return (f'{attack["suppressed"]} of {found} loops that had been found were lost, and loops '
             f'were invented in {attack["invented"]} of {silent} frames that had rightly been '
-            'left alone')
+            f'left alone{_certain(attack)}')
+
+
+def _certain(attack: Attack) -> str:
+    text = ''
+    if attack['invented_elsewhere'] != attack['invented']:
+        text = f' ({attack["invented_elsewhere"]} of them certainly elsewhere)'
+    if attack['left_out']:
+        text += (f'; {attack["left_out"]} frames were left out, because nobody can tell whether '
+                 'their match is right')
+    return text
 
 
 def sentence(text: str) -> str:
@@ -241,6 +251,8 @@ def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         '95 % interval': interval(attack['decline_ci95']) or UNDEFINED,
         'suppressed': f'{attack["suppressed"]} of {clean["tp"]}',
         'invented': f'{attack["invented"]} of {clean["tn"]}',
+        'certainly elsewhere': str(attack['invented_elsewhere']),
+        'cannot be told': str(attack['left_out']),
         'unattackable': f'{attack["unattackable"]} of {summary["frames"]}',
     } for attack in summary['attacks']]
 
@@ -262,6 +274,7 @@ def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         'average precision': number(run['average_precision'], 3),
         'MCC': number(run['mcc'], 3),
         'wrong matches': str(run['wrong_matches']),
+        'certainly elsewhere': str(run['declared_elsewhere']),
     } for title, run in runs]
 
 

@@ -82,8 +82,6 @@ class Labelled:
     Attributes
     ----------
     labels : FrameLabels
-    told_by : str
-        'co-visibility', 'depth images', 'audit', or 'poses'.
     focal_length : float
         Over the image width.
     focal_from : str
@@ -92,7 +90,6 @@ class Labelled:
     """
 
     labels: FrameLabels
-    told_by: str
     focal_length: float
     focal_from: str
 
@@ -122,7 +119,7 @@ def label_views(views: Views, config: LabelConfig, progress: Progress | None = N
         The evidence is damaged or of another sequence; or see ``label_frames``.
 
     """
-    told_by, evidence, focal = 'poses', None, Focal(config.focal_length, 'setting')
+    told_by, evidence, focal = None, None, Focal(config.focal_length, 'setting')
     if views.trajectory.frame_id != PLACE_INDEX and config.rule in ('auto', 'audit'):
         path = find_covisibility(views.source) if config.rule == 'auto' else None
         depth = find_depth(views.source) if config.rule == 'auto' and path is None else None
@@ -135,8 +132,8 @@ def label_views(views: Views, config: LabelConfig, progress: Progress | None = N
         else:
             told_by = 'audit'
             evidence, focal = _by_audit(views, config, progress)
-    return Labelled(label_frames(views.trajectory, views.stamp_ns, views.image_size, config,
-                                 evidence), told_by, focal.share, focal.source)
+    labels = label_frames(views.trajectory, views.stamp_ns, views.image_size, config, evidence)
+    return Labelled(replace(labels, told_by=told_by or labels.told_by), focal.share, focal.source)
 
 
 def _by_depth(views: Views, images: DepthImages, config: LabelConfig) -> tuple[Evidence, Focal]:

@@ -24,10 +24,15 @@ from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.judgement import Judgement, judge_evidence, judge_poses
-from adversarial_lcd_ros.sequences import Trajectory
+from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
 NO_MATCH = -1
+# What is said of a match: WRONG shares too little, or is too young; ELSEWHERE shares nothing, for
+# certain; of UNTOLD nobody can say whether it is right.
+RIGHT, WRONG, ELSEWHERE, UNTOLD = 'right', 'wrong', 'elsewhere', 'untold'
+# What told labels, where nothing but ground truth poses did.
+BY_POSES, BY_INDEX, BY_NOTHING = 'poses alone', 'numbers of places', 'no ground truth'
 # The relation of all pairs takes a few bytes a pair: 20,000 frames are about 1.6 GB.
 MAX_FRAMES = 20_000
 
@@ -48,8 +53,10 @@ class FrameLabels:
     possible : bool, (n, n)
         Pairs that a loop closure may rightly name: the views share enough.
     elsewhere : bool, (n, n)
-        Pairs that it may certainly not: the views share nothing. What is neither possible nor
-        elsewhere cannot be told.
+        Pairs that it may certainly not: the views share nothing.
+    wrong : bool, (n, n)
+        Pairs that it may not: elsewhere, and by poses alone also those that share too little.
+        What is neither possible nor wrong cannot be told.
     scaled : bool, (n, n)
         Pairs that are a change of scale: one view holds the other as a small part. Where that
         is shown, they are possible, too.
@@ -57,6 +64,9 @@ class FrameLabels:
         The frames 0 .. candidates[i] - 1 are old enough to close a loop with frame i.
     located : bool, (n,)
         A ground truth pose is near the frame.
+    told_by : str
+        What told them, in words: 'co-visibility', 'depth images', 'audit', or one of the
+        constants above.
 
     """
 
@@ -65,9 +75,11 @@ class FrameLabels:
     relation: NDArray[np.int8]
     possible: NDArray[np.bool_]
     elsewhere: NDArray[np.bool_]
+    wrong: NDArray[np.bool_]
     scaled: NDArray[np.bool_]
     candidates: NDArray[np.int64]
     located: NDArray[np.bool_]
+    told_by: str = BY_POSES
 
     @cached_property
     def names(self) -> list[str]:
@@ -103,10 +115,25 @@ class FrameLabels:
             Frame indices; NO_MATCH where the detector named none.
 
         """
+        return np.asarray(self.judge(query, match) == RIGHT)
+
+    def judge(self, query: ArrayLike, match: ArrayLike) -> NDArray[np.str_]:
+        """
+        Return what is said of matches: RIGHT, WRONG, ELSEWHERE, UNTOLD, or '' where none is named.
+
+        Parameters
+        ----------
+        query, match : int, (k,)
+            As for ``is_correct``.
+
+        """
         queries, matches = np.asarray(query, np.int64), np.asarray(match, np.int64)
-        old_enough = (matches >= 0) & (matches < self.candidates[queries])
-        right: NDArray[np.bool_] = old_enough & self.possible[queries, np.maximum(matches, 0)]
-        return right
+        named = np.maximum(matches, 0)
+        old_enough = matches < self.candidates[queries]
+        return np.select(
+            [matches < 0, self.elsewhere[queries, named],
+             self.wrong[queries, named] | (self.located[queries] & ~old_enough),
+             self.possible[queries, named]], ['', ELSEWHERE, WRONG, RIGHT], UNTOLD)
 
 
 def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[int, int],
@@ -131,8 +158,9 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     config : LabelConfig
         Thresholds.
     evidence : Evidence, optional
-        Of these frames. Without it poses alone decide, by the rule "distance" where that is
-        chosen and else by "overlap".
+        Of these frames (``labelling.label_views`` finds it). Without it poses alone decide,
+        whatever the rule: by "distance" where that is chosen and else by "overlap"; ``told_by``
+        of the result says so.
 
     Raises
     ------
@@ -150,7 +178,9 @@ def label_frames(trajectory: Trajectory, stamp_ns: ArrayLike, image_size: tuple[
     candidates = count_old_enough(stamps, config.min_gap_s)
     pairs = _relation(judgement, candidates)
     return FrameLabels(stamps, _kinds(pairs, judgement.wrong, candidates, located), pairs,
-                       judgement.possible, judgement.far, judgement.scaled, candidates, located)
+                       judgement.possible, judgement.far, judgement.wrong, judgement.scaled,
+                       candidates, located,
+                       BY_INDEX if trajectory.frame_id == PLACE_INDEX else BY_POSES)
 
 
 def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
@@ -160,7 +190,8 @@ def unlabelled(stamp_ns: ArrayLike) -> FrameLabels:
     # Views of one value: nothing is known of any pair, and that takes no memory.
     nothing = np.broadcast_to(np.False_, (count, count))
     return FrameLabels(stamps, np.zeros(count, np.int8), nothing.view(np.int8), nothing,
-                       nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool))
+                       nothing, nothing, nothing, np.zeros(count, np.int64), np.zeros(count, bool),
+                       BY_NOTHING)
 
 
 def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],

@@ -53,7 +53,7 @@ from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
 FORMAT = 'adversarial_lcd_ros/model_card/1'
 # Wider than what an evaluation counts as a loop: the decision also learns from glancing ones,
 # and from revisits within a few seconds, which short sequences are full of.
-TRAINING_LABELS = LabelConfig(min_gap_s=3.0, positive_overlap=0.45)
+TRAINING_LABELS = LabelConfig(rule='overlap', min_gap_s=3.0, positive_overlap=0.45)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
 

@@ -26,13 +26,22 @@ from adversarial_lcd_ros.evaluation.metrics import (
     measure,
     outcomes,
     right,
+    told_kind,
 )
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
+from adversarial_lcd_ros.ground_truth.labels import (
+    ELSEWHERE,
+    NEGATIVE,
+    NO_MATCH,
+    POSITIVE,
+    RIGHT,
+    UNTOLD,
+    FrameLabels,
+)
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
 from adversarial_lcd_ros.lcd.scoring import Judge
 from adversarial_lcd_ros.lcd.targets import decision_path
@@ -40,7 +49,7 @@ from adversarial_lcd_ros.training.model_folder import trained_on
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 # Of the row's columns; a change in the code below makes rows again by itself.
-KIND, SCHEMA = 'targets', 3
+KIND, SCHEMA = 'targets', 4
 _CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
          'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
          'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
@@ -132,11 +141,11 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     Return the key of a task and its row.
 
     The row has ``sequence, target, protocol, nodes, nodes_mean, frames, scored, trained_on,
-    references_trained_on, geometric_check, defences, labels, positives, negatives,
-    balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc, precision,
+    references_trained_on, geometric_check, defences, labels, told_by, positives,
+    negatives, balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc, precision,
     recall``, and ``n_pairs, distinct_pairs, seeds`` or ``n_frames, wrong_matches,
-    latency_to_first_closure_s``; labels are settings. Undefined figures are None, so
-    all of a sequence without pairs of a class.
+    untold_matches, declared_elsewhere, latency_to_first_closure_s``; labels are settings.
+    Undefined figures are None, so all of a sequence without pairs of a class.
     """
     figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
     stream = task.stream
@@ -148,7 +157,7 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
         'references_trained_on': trained_on(task.model, stream.graphs.source,
                                             (0.0, task.scored[1])),
         'geometric_check': task.lcd.geometric_check, 'defences': task.lcd.defences,
-        'labels': asdict(task.label_config), **figures}
+        'labels': asdict(task.label_config), 'told_by': stream.labels.told_by, **figures}
 
 
 def _pairs(task: TargetTask) -> Row:
@@ -202,14 +211,18 @@ def _live(task: TargetTask) -> Row:
     frame_of = {int(stamp): frame for frame, stamp in enumerate(labels.stamp_ns)}
     match = np.array([NO_MATCH if decision.match_stamp_ns is None
                       else frame_of[decision.match_stamp_ns] for decision in run.decisions])
-    correct = labels.is_correct(np.arange(len(match)), match)
+    match_is = labels.judge(np.arange(len(match)), match)
+    correct, told = match_is == RIGHT, match_is != UNTOLD
     is_loop = np.array([decision.is_loop for decision in run.decisions])
     probability = np.array([decision.probability for decision in run.decisions])
-    metrics = measure(labels.kind, is_loop, probability, correct)
-    outcome = outcomes(labels.kind, is_loop, correct)
+    metrics = measure(labels.kind, is_loop, probability, correct, told)
+    outcome = outcomes(labels.kind, is_loop, correct, told)
     interval = intervals.balanced_accuracy_interval(
-        labels.kind, right(outcome), intervals.block_frames(labels.stamp_ns), seed=0)
+        told_kind(labels.kind, outcome), right(outcome),
+        intervals.block_frames(labels.stamp_ns), seed=0)
     return {**_figures(metrics), 'n_frames': len(match), 'wrong_matches': metrics.wrong_matches,
+            'untold_matches': metrics.untold_matches,
+            'declared_elsewhere': int((is_loop & (match_is == ELSEWHERE)).sum()),
             'ci95': list(interval) if interval else None,
             'latency_to_first_closure_s': first_closure_latency_s(
                 labels.stamp_ns, labels.kind, outcome)}

@@ -13,6 +13,7 @@ _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average prec
                     'recall at 100 % precision', 'MCC'),
           'live': ('loops / new places', 'balanced accuracy', '95 % interval', 'precision',
                    'recall', 'recall at 100 % precision', 'average precision', 'MCC',
+                   'wrong matches', 'certainly elsewhere', 'cannot be told',
                    'first loop found after')}
 
 
@@ -59,14 +60,22 @@ def _cells(row: Row) -> list[str]:
     interval = row['ci95'] and f'{_share(row["ci95"][0])} to {_share(row["ci95"][1])}'
     accuracy = [_share(row['balanced_accuracy']), interval or '-']
     if row['protocol'] == 'pairs':
-        return [f'{row["n_pairs"]} ({row["positives"] or 0} loops)', *accuracy,
+        return [_pairs(row), *accuracy,
                 *(_share(row[name]) for name in
                   ('average_precision', 'recall_at_100_precision', 'mcc'))]
     latency = row['latency_to_first_closure_s']
     return [f'{row["positives"]} / {row["negatives"]}', *accuracy,
             *(_share(row[name]) for name in ('precision', 'recall', 'recall_at_100_precision',
                                              'average_precision', 'mcc')),
+            *(str(row[name]) for name in ('wrong_matches', 'declared_elsewhere',
+                                          'untold_matches')),
             '-' if latency is None else f'{latency:.1f} s']
+
+
+def _pairs(row: Row) -> str:
+    text = f'{row["n_pairs"]} ({row["positives"] or 0} loops)'
+    different = row['distinct_pairs']
+    return text if different == row['n_pairs'] else f'{text}, {different} different'
 
 
 def _share(value: float | None) -> str:

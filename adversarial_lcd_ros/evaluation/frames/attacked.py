@@ -45,14 +45,17 @@ class FrameSample:
         Indices in the stream, ascending.
     kind : int8, (k,)
         +1 a loop is there to be found, -1 a new place.
-    right : bool, (k, n)
-        Frames of the stream that a match may name.
+    match_is : str, (k, n)
+        What is said of a match with each frame of the stream: ``FrameLabels.judge``.
+    told_by : str
+        What told the labels, ``FrameLabels.told_by``.
 
     """
 
     frame: NDArray[np.int64]
     kind: NDArray[np.int8]
-    right: NDArray[np.bool_]
+    match_is: NDArray[np.str_]
+    told_by: str = ''
 
 
 @dataclass(frozen=True)
@@ -66,8 +69,8 @@ class FrameResult:
         +1 a loop is there to be found, -1 a new place.
     clean, attacked : LoopClosure
         Decisions on the clean and on the forwarded graph.
-    clean_right, attacked_right : bool
-        Whether the match named is right, declared or not.
+    clean_is, attacked_is : str
+        What is said of the match named, declared or not: ``FrameLabels.judge``.
     result : AttackResult
     query_s, search_s, judge_s : float
         Processor time spent in the asked detector, in the rest of the attack, and on judging
@@ -78,8 +81,8 @@ class FrameResult:
     kind: int
     clean: LoopClosure
     attacked: LoopClosure
-    clean_right: bool
-    attacked_right: bool
+    clean_is: str
+    attacked_is: str
     result: AttackResult
     query_s: float
     search_s: float
@@ -159,9 +162,9 @@ def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
                 chosen.append(int(order[seed % len(part)]))
     frame = np.array(sorted(chosen), np.int64)
     every = np.arange(len(labels.kind))
-    right = np.array([labels.is_correct(np.full(len(every), query), every) for query in frame],
-                     bool).reshape(len(frame), len(every))
-    return FrameSample(frame, labels.kind[frame], right)
+    match_is = np.array([labels.judge(np.full(len(every), query), every) for query in frame],
+                        np.str_).reshape(len(frame), len(every))
+    return FrameSample(frame, labels.kind[frame], match_is, labels.told_by)
 
 
 def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],
@@ -202,7 +205,7 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
             for contest in contests:
                 contest.results.append(_attack_frame(
                     contest, graph, clean[contest.judging.config], int(sample.kind[row]),
-                    sample.right[row], index_of))
+                    sample.match_is[row], index_of))
         for detector in detectors.values():
             detector.remember(graph)
         for contest in contests:
@@ -230,7 +233,7 @@ def _detector(config: LcdConfig,
 
 
 def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, kind: int,
-                  right: NDArray[np.bool_], index_of: dict[int, int]) -> FrameResult:
+                  match_is: NDArray[np.str_], index_of: dict[int, int]) -> FrameResult:
     ask = _Timed(contest.asked)
     begun = time.thread_time()
     result = contest.adversary.attack(graph, ask)
@@ -238,13 +241,14 @@ def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, 
     after = contest.judging.judge(result.perturbed)
     _check_budgets(result, ask.count)
     return FrameResult(
-        kind, clean, after, _is_right(clean, right, index_of), _is_right(after, right, index_of),
-        result, ask.spent_s, attacked - begun - ask.spent_s, time.thread_time() - attacked)
+        kind, clean, after, _said_of(clean, match_is, index_of),
+        _said_of(after, match_is, index_of), result, ask.spent_s,
+        attacked - begun - ask.spent_s, time.thread_time() - attacked)
 
 
-def _is_right(decision: LoopClosure, right: NDArray[np.bool_], index_of: dict[int, int]) -> bool:
-    return (decision.match_stamp_ns is not None
-            and bool(right[index_of[decision.match_stamp_ns]]))
+def _said_of(decision: LoopClosure, match_is: NDArray[np.str_], index_of: dict[int, int]) -> str:
+    return ('' if decision.match_stamp_ns is None
+            else str(match_is[index_of[decision.match_stamp_ns]]))
 
 
 def _check_budgets(result: AttackResult, queries: int) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
+from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE, RIGHT, UNTOLD
 
 _TRACE_POINTS = 8
 # What the columns hold, for whoever reads rows that another run has written.
@@ -20,7 +20,8 @@ ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle',
                      'mode', 'edits', 'variant', 'name', 'versions'), _TEXT),
     **dict.fromkeys(('ratio', 'queries_per_edit', 'nodes', 'threshold', 'seed', 'frames',
-                     'positives', 'negatives', 'suppressed', 'invented', 'unattackable',
+                     'positives', 'negatives', 'suppressed', 'invented', 'left_out',
+                     'invented_elsewhere', 'unattackable',
                      'duration_s', 'query_s', 'search_s', 'judge_s'), _NUMBER),
     **dict.fromkeys(('nodes_mean', 'edges_mean', 'accuracy_clean', 'accuracy_attacked',
                      'balanced_clean', 'balanced_attacked', 'decline_pp', 'edits_mean',
@@ -60,12 +61,14 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'edges_mean': _mean([attack.clean.edge_count for attack in attacks]),
         'frames': len(results), 'positives': int((kind == POSITIVE).sum()),
         'negatives': int((kind == NEGATIVE).sum()),
-        'accuracy_clean': _mean(metrics.right(before)),
-        'accuracy_attacked': _mean(metrics.right(after)),
+        'accuracy_clean': _accuracy(before), 'accuracy_attacked': _accuracy(after),
         'balanced_clean': metrics.balanced_accuracy(kind, before),
         'balanced_attacked': metrics.balanced_accuracy(kind, after),
         'decline_pp': change.decline_pp, 'suppressed': change.suppressed,
-        'invented': change.invented,
+        'invented': change.invented, 'left_out': change.left_out,
+        'invented_elsewhere': sum(
+            result.attacked_is == ELSEWHERE and (was, now) == ('TN', 'FP')
+            for result, was, now in zip(results, before, after, strict=True)),
         'unattackable': sum(attack.edit_budget < 1 or attack.status == 'skipped'
                             for attack in attacks),
         'edits_mean': _mean([len(attack.flips) for attack in attacks]),
@@ -86,7 +89,12 @@ def _outcomes(kind: NDArray[np.int8], results: Sequence[FrameResult],
               which: str) -> metrics.Outcomes:
     return metrics.outcomes(
         kind, np.array([getattr(result, which).is_loop for result in results], bool),
-        np.array([getattr(result, f'{which}_right') for result in results], bool))
+        np.array([getattr(result, f'{which}_is') == RIGHT for result in results], bool),
+        np.array([getattr(result, f'{which}_is') != UNTOLD for result in results], bool))
+
+
+def _accuracy(outcome: metrics.Outcomes) -> float | None:
+    return _mean(metrics.right(outcome[outcome != metrics.UNTOLD_MATCH]))
 
 
 def _mean(values: Sequence[float] | NDArray[Any]) -> float | None:
@@ -98,8 +106,9 @@ def _frame(result: FrameResult, before: str, after: str) -> dict[str, Any]:
     last = len(attack.trace) - 1
     shown = sorted({round(place) for place in np.linspace(0, max(last, 0), _TRACE_POINTS)})
     return {'stamp': attack.clean.stamp_ns, 'kind': result.kind, 'clean': str(before),
-            'attacked': str(after), 'edit_budget': attack.edit_budget,
-            'edits': len(attack.flips), 'queries': attack.queries, 'status': attack.status,
-            'reason': attack.reason, 'loss_before': round(attack.loss_before, 4),
+            'attacked': str(after), 'attacked_is': result.attacked_is,
+            'edit_budget': attack.edit_budget, 'edits': len(attack.flips),
+            'queries': attack.queries, 'status': attack.status, 'reason': attack.reason,
+            'loss_before': round(attack.loss_before, 4),
             'loss_after': round(attack.loss_after, 4),
             'trace': [round(attack.trace[place], 4) for place in shown if place <= last]}

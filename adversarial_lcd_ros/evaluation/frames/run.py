@@ -223,7 +223,7 @@ def run_task(task: Task) -> tuple[list[tuple[str, Row]], float]:
     rows = [(key, {**make_row(cell, task.seed, task.sequence, results),
                    'trained_on': trained_on(decision_path(task.lcd.model, cell.target),
                                             task.graphs.source),
-                   'versions': versions_digest()})
+                   'told_by': task.sample.told_by, 'versions': versions_digest()})
             for key, cell, results in zip(task.keys, task.cells, found, strict=True)]
     return rows, task.cost_s
 

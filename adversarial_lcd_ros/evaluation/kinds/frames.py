@@ -58,7 +58,9 @@ class FramesResults(ResultsKind):
                 'balanced accuracy': f'{wording.percent(row["balanced_clean"])} → '
                                      f'{wording.percent(row["balanced_attacked"])}',
                 'decline, points': wording.points(row['decline_pp']),
-                '95 % interval': wording.interval(row['ci95']) or wording.UNDEFINED}
+                '95 % interval': wording.interval(row['ci95']) or wording.UNDEFINED,
+                'suppressed': wording.mean_count(row.get('suppressed')),
+                'invented': wording.mean_count(row.get('invented'))}
                 for row in results.rows if row['sequence'] == sequence]))
         return tables
 

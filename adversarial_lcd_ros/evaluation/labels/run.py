@@ -118,7 +118,7 @@ def _counts(found: Labelled) -> dict[str, Any]:
     lower = np.tril(np.ones_like(labels.possible), -1)
     old = np.arange(len(labels.kind))[None, :] < labels.candidates[:, None]
     words = Counter(labels.names)
-    return {'frames': len(labels.kind), 'told_by': found.told_by,
+    return {'frames': len(labels.kind), 'told_by': labels.told_by,
             'focal_length': found.focal_length, 'focal_from': found.focal_from,
             **{kind: words[kind] for kind in FRAME_KINDS},
             'loop_pairs': int((lower & (labels.relation == POSITIVE)).sum()),

@@ -16,6 +16,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     USUAL,
     Summary,
     frame_right,
+    frame_untold,
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import SETTING
@@ -90,7 +91,8 @@ def query_curves(rows: Iterable[Row], setting: Mapping[str, object], ratio: floa
 
 def _queries_to_turn(row: Row) -> NDArray[np.float64]:
     # Of the decisions that were right before: infinite where the attack did not turn them.
-    before, after = frame_right(row, 'clean'), frame_right(row, 'attacked')
+    before = frame_right(row, 'clean') & ~frame_untold(row)
+    after = frame_right(row, 'attacked')
     queries = np.array([frame['queries'] for frame in row['frame_results']], np.float64)
     return np.where(after, np.inf, queries)[before]
 

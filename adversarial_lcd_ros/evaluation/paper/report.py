@@ -161,6 +161,8 @@ def _sequences(cells: Sequence[Summary]) -> list[dict[str, str]]:
     for sequence in sorted({cell['sequence'] for cell in cells}):
         there = [cell for cell in cells if cell['sequence'] == sequence]
         rows.append({'sequence': sequence,
+                     'labels by': ', '.join(sorted({cell['told_by'] for cell in there}))
+                     or 'unknown',
                      'frames a seed': _range(there, 'frames'),
                      'different loops': _range(there, 'different_positives'),
                      'different new places': _range(there, 'different_negatives'),
@@ -218,6 +220,7 @@ def _figures(summary: Summary) -> dict[str, str]:
 def _counts(summary: Summary) -> dict[str, str]:
     return {'suppressed': f'{_count(summary["suppressed"])} of {_count(summary["found_clean"])}',
             'invented': f'{_count(summary["invented"])} of {_count(summary["silent_clean"])}',
+            'certainly elsewhere': _count(summary['invented_elsewhere']),
             'unattackable': f'{_count(summary["unattackable"])} of {_count(summary["frames"])}',
             'edits': _count(summary['edits_mean']), 'queries': _count(summary['queries_mean'])}
 

@@ -28,11 +28,11 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, is_yardstick, method_of
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, right
+from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, UNTOLD_MATCH, right
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
-KIND, SCHEMA = 'frames', 5  # of summary.json
+KIND, SCHEMA = 'frames', 6  # of summary.json
 
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', *COLUMNS, 'oracle', 'mode', 'ratio', 'edits',
@@ -41,8 +41,9 @@ ATTACK = CELL[1:]
 # What a row need not say.
 USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
-          'decline_pp', 'suppressed', 'invented', 'unattackable', 'frames', 'positives',
-          'negatives', 'nodes_mean', 'edges_mean', 'edits_mean', 'queries_mean', 'success_rate')
+          'decline_pp', 'suppressed', 'invented', 'invented_elsewhere', 'left_out',
+          'unattackable', 'frames', 'positives', 'negatives', 'nodes_mean', 'edges_mean',
+          'edits_mean', 'queries_mean', 'success_rate')
 _KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0, 0), strict=True))
 _BOOTSTRAP_SEED = 0
 
@@ -66,6 +67,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Summary]:
         ``CELL``; means over the seeds of the figures; and
 
         * ``trained_on``: the detector was trained on frames of the sequence; None if unknown
+        * ``told_by``: what told the labels; empty if unknown
         * ``different_positives``, ``different_negatives``: frames of a kind, repeats once
         * ``seeds``, ``decline_sd_pp``: number of repeats, and their standard deviation
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
@@ -158,6 +160,12 @@ def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
     return np.array([_is_right(frame[which], row) for frame in row['frame_results']], bool)
 
 
+def frame_untold(row: Row) -> NDArray[np.bool_]:
+    """Return which frames are in no figure: a match, clean or attacked, cannot be told, (n,)."""
+    return np.array([UNTOLD_MATCH in (frame['clean'], frame['attacked'])
+                     for frame in row['frame_results']], bool)
+
+
 def _cell_key(row: Row) -> tuple[Hashable, ...]:
     missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
                if name not in row and name not in ('asked_target', *USUAL)]
@@ -189,7 +197,8 @@ def _summarise(rows: Sequence[Row]) -> Summary:
     positive, negative = _right_before(rows)
     cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
     cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
-                trained_on=rows[0].get('trained_on'), **_different_frames(rows),
+                trained_on=rows[0].get('trained_on'), told_by=rows[0].get('told_by') or '',
+                **_different_frames(rows),
                 decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
                 ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
                 duration_s=math.fsum(row['duration_s'] for row in rows))
@@ -224,7 +233,7 @@ def _kinds(row: Row) -> NDArray[np.int8]:
 
 
 def _is_right(value: Any, row: Row) -> bool:
-    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', ''):
+    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', UNTOLD_MATCH, ''):
         return bool(right(np.array(value)))
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
@@ -245,7 +254,7 @@ def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
                                   'stamp')
         lost = frame_right(row, 'clean').astype(np.int64) - frame_right(row, 'attacked')
         for index, kind in enumerate((POSITIVE, NEGATIVE)):
-            member = _kinds(row) == kind
+            member = (_kinds(row) == kind) & ~frame_untold(row)
             size[index, place] += member
             total[index, place] += np.where(member, lost, 0)
     interval = intervals.class_mean_interval(
@@ -286,5 +295,5 @@ def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...]
                         'balanced_attacked', 'edits_mean', 'queries_mean', 'nodes_mean',
                         'success_rate')},
         **{name: math.fsum(cell[name] for cell in cells)
-           for name in ('suppressed', 'invented', 'unattackable', 'frames', 'found_clean',
-                        'silent_clean')}}
+           for name in ('suppressed', 'invented', 'invented_elsewhere', 'left_out',
+                        'unattackable', 'frames', 'found_clean', 'silent_clean')}}

@@ -15,6 +15,7 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation.metrics import outcomes
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.ground_truth.labels import UNTOLD
 from adversarial_lcd_ros.lcd.defences import defence_names
 from adversarial_lcd_ros.lcd.defences.geometric_check import GeometricCheck
 
@@ -56,6 +57,7 @@ def behind_check(run: Sequence[QueryRecord]) -> list[QueryRecord]:
               for record in run]
     declared = [replace(record, is_loop=loop) for record, loop in zip(run, stands, strict=True)]
     outcome = outcomes(column(declared, 'label'), column(declared, 'is_loop'),
-                       column(declared, 'match_correct'))
+                       column(declared, 'match_correct'),
+                       column(declared, 'match_is') != UNTOLD)
     return [replace(record, outcome=str(found))
             for record, found in zip(declared, outcome, strict=True)]

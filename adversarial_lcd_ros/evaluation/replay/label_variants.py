@@ -18,6 +18,8 @@ from adversarial_lcd_ros.ground_truth.labels import (
     NEGATIVE,
     NO_MATCH,
     POSITIVE,
+    RIGHT,
+    UNTOLD,
     FrameLabels,
 )
 
@@ -90,5 +92,6 @@ def write_sweep(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 def _outcomes(labels: FrameLabels, run: Sequence[QueryRecord]) -> Outcomes:
     match = np.array([NO_MATCH if record.match_frame is None else record.match_frame
                       for record in run], np.int64)
-    return outcomes(labels.kind, column(run, 'is_loop').astype(bool),
-                    labels.is_correct(np.arange(len(match)), match))
+    match_is = labels.judge(np.arange(len(match)), match)
+    return outcomes(labels.kind, column(run, 'is_loop').astype(bool), match_is == RIGHT,
+                    match_is != UNTOLD)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from adversarial_lcd_ros.evaluation.metrics import UNTOLD_MATCH
 from adversarial_lcd_ros.evaluation.replay.records import NO_TRUTH, QueryRecord
 
 _EFFECTS = {
@@ -21,11 +22,12 @@ _OUTCOMES = {
     'FN': ('missed', 'The loop is missed, attack or not.'),
     'WM': ('wrong match', 'The loop is declared with a wrong frame, attack or not.'),
     'FP': ('false alarm', 'A loop is declared where there is none, attack or not.'),
+    UNTOLD_MATCH: ('cannot be told', 'Nobody can say whether the match declared is right.'),
     '': ('not scored', 'Ground truth cannot tell whether there is a loop.')}
 _UNCHANGED = 'unchanged', 'The decision is the same, attack or not.'
 # The most telling first.
 _ORDER = ('suppressed', 'invented', 'diverted', 'silenced', 'raised', 'redirected',
-          'TP', 'TN', 'regained', 'withdrawn', 'FN', 'WM', 'FP', '')
+          'TP', 'TN', 'regained', 'withdrawn', 'FN', 'WM', 'FP', UNTOLD_MATCH, '')
 
 
 def choose_records(run: Sequence[QueryRecord], count: int = 6) -> list[QueryRecord]:

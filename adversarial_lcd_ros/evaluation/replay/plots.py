@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.evaluation.page import CLEAN_COLOUR, GRID, STYLE, attack_colour, svg
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
+from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, UNTOLD
 
 # In equal steps of log odds.
 THRESHOLDS = 1 / (1 + np.exp(-np.linspace(-7, 7, 281)))
@@ -45,7 +45,7 @@ def decline_over_threshold(clean: Sequence[QueryRecord], attacks: Sequence[Run],
 
     """
     before = _balanced_accuracies(clean)
-    if not attacks or np.isnan(before).any():
+    if not attacks or np.isnan(before).all():
         return None
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 3.7), layout='constrained')
@@ -68,12 +68,15 @@ def decline_over_threshold(clean: Sequence[QueryRecord], attacks: Sequence[Run],
 def _balanced_accuracies(run: Sequence[QueryRecord]) -> NDArray[np.float64]:
     """Return balanced accuracy at each of THRESHOLDS; nan if a class is empty."""
     kind, probability = column(run, 'label'), column(run, 'probability').astype(np.float64)
+    correct, untold = column(run, 'match_correct').astype(bool), column(run, 'match_is') == UNTOLD
     declared = probability >= THRESHOLDS[:, None]
-    loop, new = kind == POSITIVE, kind == NEGATIVE
-    if not (loop.any() and new.any()):
-        return np.full(len(THRESHOLDS), np.nan)
-    found = declared & column(run, 'match_correct').astype(bool)
-    balanced: NDArray[np.float64] = (found[:, loop].mean(1) + 1 - declared[:, new].mean(1)) / 2
+    scored = ~(declared & untold)
+    with np.errstate(invalid='ignore'):
+        found, silent = ((right & scored)[:, kind == value].sum(1)
+                         / scored[:, kind == value].sum(1)
+                         for right, value in ((declared & correct, POSITIVE),
+                                              (~declared, NEGATIVE)))
+    balanced: NDArray[np.float64] = (found + silent) / 2
     return balanced
 
 

@@ -200,7 +200,7 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
                    for record in records]
     summary = summarise(sequence.name, records, {RECORDED: None}, GraphStatistics.of(
         [graph.node_count for graph in run.clean], [graph.edge_count for graph in run.clean]),
-        seed, lcd)
+        seed, lcd, told_by=found.told_by)
     summary['notes'] = notes
     summary['duration_s'] = time.monotonic() - started_s
     folder = ResultsFolder.create(output)

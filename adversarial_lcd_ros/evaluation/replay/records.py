@@ -14,7 +14,14 @@ from adversarial_lcd_ros.errors import EvaluationError, FileError
 from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
 from adversarial_lcd_ros.files.reading import csv_rows
 from adversarial_lcd_ros.files.writing import plain_cell, write_csv
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, NO_MATCH, POSITIVE, FrameLabels
+from adversarial_lcd_ros.ground_truth.labels import (
+    NEGATIVE,
+    NO_MATCH,
+    POSITIVE,
+    RIGHT,
+    UNTOLD,
+    FrameLabels,
+)
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 
 CLEAN = 'clean'
@@ -54,12 +61,16 @@ class QueryRecord:
     match_frame : int or None
         Index of the best matching frame, declared or not.
     match_correct : bool
-        Ground truth does not contradict that match.
+        That match is right.
     outcome : str
-        TP, FN, WM, FP, TN, or empty if the frame is not scored.
+        TP, FN, WM, FP, TN; UM if nobody can say whether the match is right; empty if the frame is
+        not scored.
     effect : str
         Against the clean run: suppressed, diverted, invented, regained, withdrawn, or empty;
         without ground truth what ``decision_change`` says.
+    match_is : str
+        What is said of the match: right, wrong, elsewhere (shares nothing, for certain), untold,
+        or empty without one.
     status, reason, edit_budget, edits, query_budget, queries, loss_before, loss_after, duration_s
         The attacker's report; None in the clean run.
     support : float or None
@@ -80,6 +91,7 @@ class QueryRecord:
     match_correct: bool
     outcome: str
     effect: str = ''
+    match_is: str = ''
     status: str | None = None
     reason: str | None = None
     edit_budget: int | None = None
@@ -146,15 +158,17 @@ def _run_records(name: str, labels: FrameLabels,
     _check_frames(f'{name}: decisions', labels.stamp_ns, decisions)
     frame_of = {int(stamp): index for index, stamp in enumerate(labels.stamp_ns)}
     match = np.array([_match_frame(decision, frame_of) for decision in decisions], np.int64)
-    correct = labels.is_correct(np.arange(len(match)), match)
+    match_is = labels.judge(np.arange(len(match)), match)
+    correct = match_is == RIGHT
     is_loop = np.array([decision.is_loop for decision in decisions], bool)
-    outcome = outcomes(labels.kind, is_loop, correct)
+    outcome = outcomes(labels.kind, is_loop, correct, match_is != UNTOLD)
     return [QueryRecord(
         run=name, frame=index, sequence_number=decision.sequence, stamp_ns=decision.stamp_ns,
         kind=labels.names[index], probability=decision.probability, is_loop=decision.is_loop,
         candidates=decision.candidates,
         match_frame=None if match[index] == NO_MATCH else int(match[index]),
-        match_correct=bool(correct[index]), outcome=str(outcome[index]))
+        match_correct=bool(correct[index]), outcome=str(outcome[index]),
+        match_is=str(match_is[index]))
         for index, decision in enumerate(decisions)]
 
 

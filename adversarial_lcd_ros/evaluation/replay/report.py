@@ -33,6 +33,7 @@ from adversarial_lcd_ros.evaluation.results import (
     read_json,
 )
 from adversarial_lcd_ros.files.writing import write_text
+from adversarial_lcd_ros.ground_truth.labels import BY_INDEX, BY_POSES
 
 _KIND_TEXT = (('positive', 'a loop is there to be found'),
               ('negative', 'a new place: no loop is there'),
@@ -128,7 +129,8 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
                                     'svg+xml'),
         'pictures': [(title, caption, data_uri(data, 'jpeg'))
                      for title, caption, data in read_pictures(folder)],
-        'sample': _sample(summary), 'configuration': configuration,
+        'sample': _sample(summary), 'by_poses': (BY_POSES, BY_INDEX),
+        'told_by': summary.get('told_by') or 'ground truth', 'configuration': configuration,
         'command_line': shlex.join(configuration['command_line']),
         'environment': read_json(folder / ENVIRONMENT)}
     path = folder / REPORT

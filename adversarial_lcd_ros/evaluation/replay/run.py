@@ -176,7 +176,8 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         name: run.forwarded for name, run in runs.items()}}, plan.lcd)
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
         [graph.node_count for graph in clean.clean],
-        [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd)
+        [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd,
+        told_by=labels.told_by)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:

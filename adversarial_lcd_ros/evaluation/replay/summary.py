@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
     first_closure_latency_s,
     measure,
     right,
+    told_kind,
 )
 from adversarial_lcd_ros.evaluation.replay.behind import behind_check
 from adversarial_lcd_ros.evaluation.replay.records import (
@@ -32,12 +33,15 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     runs_of,
 )
 from adversarial_lcd_ros.evaluation.results import summary_document
+from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, UNTOLD, WRONG
 from adversarial_lcd_ros.lcd.defences import defence_names
 
-KIND, SCHEMA = 'replay', 2
+KIND, SCHEMA = 'replay', 3
 # What nobody can count without ground truth.
 _NEED_LABELS = ('positives', 'negatives', 'tp', 'fn', 'fp', 'tn', 'wrong_matches', 'suppressed',
-                'diverted', 'invented', 'regained', 'withdrawn', 'wrong_closures_unscored')
+                'diverted', 'invented', 'regained', 'withdrawn', 'left_out', 'untold_matches',
+                'declared_elsewhere', 'invented_elsewhere', 'diverted_elsewhere',
+                'wrong_closures_unscored')
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,8 @@ class GraphStatistics:
 
 def summarise(sequence: str, records: Sequence[QueryRecord],
               attacks: Mapping[str, AttackConfig | None], graphs: GraphStatistics, seed: int,
-              lcd: LcdConfig | None = None,
-              block_s: float = intervals.BLOCK_S) -> dict[str, Any]:
+              lcd: LcdConfig | None = None, block_s: float = intervals.BLOCK_S,
+              told_by: str = '') -> dict[str, Any]:
     """
     Return the figures of an evaluation (``as_document``: summary.json); undefined ones are None.
 
@@ -80,6 +84,8 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
         Of the detector, to be named beside its figures.
     block_s : float
         Length of the bootstrap's blocks, seconds.
+    told_by : str
+        What told the labels, ``FrameLabels.told_by``.
 
     Raises
     ------
@@ -98,9 +104,9 @@ def summarise(sequence: str, records: Sequence[QueryRecord],
     kinds = Counter(record.kind for record in clean)
     summary = {
         'sequence': sequence, 'labelled': kinds[NO_TRUTH] < len(clean), 'frames': len(clean),
-        'graphs': graphs.count, 'decisions': len(clean), 'nodes_mean': graphs.nodes_mean,
-        'edges_mean': graphs.edges_mean, 'positives': kinds['positive'],
-        'negatives': kinds['negative'],
+        'told_by': told_by, 'graphs': graphs.count, 'decisions': len(clean),
+        'nodes_mean': graphs.nodes_mean, 'edges_mean': graphs.edges_mean,
+        'positives': kinds['positive'], 'negatives': kinds['negative'],
         'not_scored': {name: kinds[name] for name in FRAME_KINDS[2:]},
         'clean': _run_figures(clean, block, seed),
         'attacks': [_attack_figures(name, attacks[name], clean, run, block, seed)
@@ -135,8 +141,8 @@ def _decline(clean: Sequence[QueryRecord], run: Sequence[QueryRecord], block: in
     """Return what a run lost against the clean one."""
     kind, before, after = column(clean, 'label'), column(clean, 'outcome'), column(run, 'outcome')
     return {**run_metrics(run).as_dict(), **asdict(effect(kind, before, after)),
-            'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
-                                                        seed)}
+            'decline_ci95': intervals.decline_interval(
+                told_kind(kind, before, after), right(before), right(after), block, seed)}
 
 
 def _without_labels(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,7 +185,8 @@ def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
 def run_metrics(run: Sequence[QueryRecord]) -> Metrics:
     """Return the figures of the records of one run."""
     return measure(column(run, 'label'), column(run, 'is_loop'),
-                   column(run, 'probability').astype(np.float64), column(run, 'match_correct'))
+                   column(run, 'probability').astype(np.float64), column(run, 'match_correct'),
+                   column(run, 'match_is') != UNTOLD)
 
 
 def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
@@ -188,11 +195,14 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
         **run_metrics(run).as_dict(),
         'loops_declared': sum(record.is_loop for record in run),
         'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
-            kind, right(outcome), block, seed),
+            told_kind(kind, outcome), right(outcome), block, seed),
+        # Joins that certainly share nothing, on whatever frame.
+        'declared_elsewhere': sum(record.is_loop and record.match_is == ELSEWHERE
+                                  for record in run),
         # Outside the scored frames a closure with another place is still wrong.
         'wrong_closures_unscored': sum(
-            record.is_loop and not record.match_correct and not record.outcome
-            and record.kind != 'no_ground_truth' for record in run),
+            record.is_loop and record.match_is in (WRONG, ELSEWHERE) and not record.outcome
+            for record in run),
         'first_closure_latency_s': first_closure_latency_s(
             column(run, 'stamp_ns'), kind, outcome)}
 
@@ -211,8 +221,10 @@ def _attack_figures(name: str, config: AttackConfig | None, clean: Sequence[Quer
     return {
         'name': name, **settings, 'decisions': len(run), **_effort(run),
         **_run_figures(run, block, seed), **change, **_changes(clean, run),
-        'decline_ci95': intervals.decline_interval(kind, right(before), right(after), block,
-                                                    seed)}
+        **{f'{what}_elsewhere': sum(record.effect == what and record.match_is == ELSEWHERE
+                                    for record in run) for what in ('invented', 'diverted')},
+        'decline_ci95': intervals.decline_interval(
+            told_kind(kind, before, after), right(before), right(after), block, seed)}
 
 
 def _changes(clean: Sequence[QueryRecord], run: Sequence[QueryRecord]) -> dict[str, Any]:
