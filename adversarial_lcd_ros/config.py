@@ -24,6 +24,7 @@ from adversarial_lcd_ros.registry import (
 )
 
 MODES = ('query', 'surrogate', 'pass')
+RETRIES = ('never', 'gained', 'set')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -231,6 +232,11 @@ class AttackConfig(Config):
     surrogate: str = setting(
         'svm_rbf', 'Stepwise: model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
+    retry: str = setting(
+        'never', 'Stepwise: what becomes of flips that were asked about and not chosen. never: '
+        'they are not asked about again; gained: those that gained are; set: the same as never, '
+        "but the best three are chosen at once, after three edits' worth of queries.",
+        choices=RETRIES)
     gamma: str = setting(
         'paper', 'Width of the kernels rbf and poly: 1 / (2 sigma^2) as in Eq. (8), or '
         'scikit-learn\'s "scale", 1 / (d Var).', choices=('paper', 'scale'))
