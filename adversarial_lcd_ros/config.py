@@ -225,8 +225,8 @@ class AttackConfig(Config):
         'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
         'beforehand; pass: forward unchanged.', choices=MODES)
     search: str = setting(
-        'stepwise', 'How flips are looked for: flip after flip as in the paper, or by our own '
-        'recall.', choices=SEARCHES)
+        'stepwise', 'How flips are looked for: flip after flip as in the paper, by our own '
+        'recall, or by Bayesian optimisation as in GRABNEL.', choices=SEARCHES)
     perturbation: str = setting(
         'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
