@@ -24,6 +24,7 @@ from adversarial_lcd_ros.registry import (
 )
 
 MODES = ('query', 'surrogate', 'pass')
+RETRIES = ('never', 'gained', 'set')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -224,13 +225,18 @@ class AttackConfig(Config):
         'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
         'beforehand; pass: forward unchanged.', choices=MODES)
     search: str = setting(
-        'stepwise', 'How flips are looked for: flip after flip as in the paper, or by our own '
-        'recall.', choices=SEARCHES)
+        'stepwise', 'How flips are looked for: flip after flip as in the paper, by our own '
+        'recall, or by Bayesian optimisation as in GRABNEL.', choices=SEARCHES)
     perturbation: str = setting(
         'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
         'svm_rbf', 'Stepwise: model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
+    retry: str = setting(
+        'never', 'Stepwise: what becomes of flips that were asked about and not chosen. never: '
+        'they are not asked about again; gained: those that gained are; set: the same as never, '
+        "but the best three are chosen at once, after three edits' worth of queries.",
+        choices=RETRIES)
     gamma: str = setting(
         'paper', 'Width of the kernels rbf and poly: 1 / (2 sigma^2) as in Eq. (8), or '
         'scikit-learn\'s "scale", 1 / (d Var).', choices=('paper', 'scale'))

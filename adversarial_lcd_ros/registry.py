@@ -173,6 +173,7 @@ DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
 SEARCHES = Table('search', 'attack.search:Search', {
     'stepwise': 'searches.stepwise:Stepwise',
     'recall': 'searches.recall:Recall',
+    'grabnel': 'searches.grabnel:Grabnel',
 }, 'searches', {'optimum': 'it looks into the detector, and is for recipes of the protocol '
                            '"frames" alone'})
 

@@ -1,6 +1,7 @@
 """The attack: budgets enforced, nothing else changed, same seed same bytes."""
 
 from dataclasses import replace
+import math
 import time
 
 from graph_factory import flips_of, graphs, make_graph
@@ -78,6 +79,7 @@ def test_the_oracle_counts_and_stops():
 def test_logit_of_answers():
     assert answer_logit(LcdAnswer(0, True, True, probability(3.25))) == pytest.approx(3.25)
     assert answer_logit(LcdAnswer(0, False, True, 0.0)) == -700
+    assert answer_logit(LcdAnswer(0, True, True, 1.0, log_odds=50.25)) == 50.25
     assert answer_logit(LcdAnswer(0, True, False, 1.0)) == 1
     assert answer_logit(LcdAnswer(0, False, False, 0.0)) == -1
 
@@ -260,7 +262,8 @@ def test_what_cannot_be_attacked_passes_through(config, reason):
 def test_a_detector_without_candidates_costs_one_query():
     detector = SecretDetector(GRAPH)
     result = Attacker(AttackConfig(ratio=1e-3)).process(
-        GRAPH, lambda graph: replace(detector(graph), is_loop=False, probability=0.0))
+        GRAPH, lambda graph: replace(detector(graph), is_loop=False, probability=0.0,
+                                     log_odds=-math.inf))
     assert (result.status, result.queries) == ('failure', 1)
     assert result.perturbed == GRAPH
 

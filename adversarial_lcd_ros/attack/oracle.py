@@ -18,7 +18,7 @@ import numpy as np
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, BudgetError
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.messages.types import MAX_LOGIT, LcdAnswer, log_odds
+from adversarial_lcd_ros.messages.types import MAX_LOGIT, LcdAnswer
 
 # What a detector of one's own may answer: the probability of a loop, or whether it is one.
 Answer = LcdAnswer | float | bool
@@ -48,10 +48,15 @@ def edit_budget(nodes: int, ratio: float) -> int:
 
 
 def answer_logit(answer: LcdAnswer) -> float:
-    """Return the log odds in a soft answer; +-1 for a hard one, which tells the side only."""
+    """
+    Return the log odds in a soft answer; +-1 for a hard one, which tells the side only.
+
+    They are the answer's own: a probability is 1 in double precision from log odds of 37 on, and
+    a search would not see there what a flip gains.
+    """
     if not answer.is_soft:
         return HARD_LOGIT if answer.is_loop else -HARD_LOGIT
-    return min(max(log_odds(answer.probability), -MAX_LOGIT), MAX_LOGIT)
+    return min(max(answer.log_odds, -MAX_LOGIT), MAX_LOGIT)
 
 
 def as_answer(answer: Answer) -> LcdAnswer:
@@ -96,6 +101,11 @@ class Oracle:
     budget: int
     deadline_s: float = math.inf
     used: int = 0
+
+    @property
+    def left(self) -> int:
+        """Queries that are left."""
+        return self.budget - self.used
 
     @property
     def exhausted(self) -> str:

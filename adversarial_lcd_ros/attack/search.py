@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -66,7 +67,7 @@ class Hunt:
         logit = answer_logit(answer)
         return cls(graph, graph, edit_budget, oracle, answer.is_loop,
                    -logit if answer.is_loop else logit,
-                   hopeless=answer.is_soft and answer.probability == 0)
+                   hopeless=answer.is_soft and answer.log_odds == -math.inf)
 
     @property
     def over(self) -> str:

@@ -20,6 +20,7 @@ from adversarial_lcd_ros.attack.deadline import check_time
 from adversarial_lcd_ros.attack.memory import Memory
 from adversarial_lcd_ros.attack.perturbations import Allowed, make_perturbation
 from adversarial_lcd_ros.attack.search import Hunt, Search
+from adversarial_lcd_ros.attack.searches.tries import Tries
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData, data_path
 from adversarial_lcd_ros.attack.surrogates import Kernel, Surrogate, make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
@@ -64,21 +65,30 @@ class _Learner:
         return [waiting[place] for place in order]
 
 
+@dataclass(frozen=True, eq=False)
+class _Queried:
+    """A flip, shape (1, 2), and what the detector says of the graph with it."""
+
+    pairs: NDArray[np.int64]
+    loss: float
+    succeeded: bool
+
+
 class Stepwise(Search):
     """
     A perturbation proposes flips, a surrogate ranks them, the detector judges the first of them.
 
     The best of ``queries_per_edit`` flips is committed unless it lowers the loss, and the next
     flip is looked for from there, "until the attack is successful, or until the maximum query
-    budget is exhausted". Without queries, what a surrogate trained beforehand ranks highest is
-    flipped; which of the two trained ones, the one for loops or the one for other frames, is
-    chosen by whether the graph's words were seen before.
+    budget is exhausted"; ``retry`` says what becomes of the others. Without queries, what a
+    surrogate trained beforehand ranks highest is flipped; which of the two trained ones, the one
+    for loops or the one for other frames, is chosen by whether the graph's words were seen before.
     """
 
     name: ClassVar[str] = 'stepwise'
     own_settings: ClassVar[tuple[str, ...]] = (
-        'perturbation', 'surrogate', 'gamma', 'sigma', 'surrogate_data', 'wl_iterations',
-        'wl_features')
+        'perturbation', 'surrogate', 'retry', 'gamma', 'sigma', 'surrogate_data',
+        'wl_iterations', 'wl_features')
 
     def __init__(self, config: AttackConfig) -> None:
         super().__init__(config)
@@ -109,48 +119,69 @@ class Stepwise(Search):
         """Commit flip after flip; return why it ended."""
         surrogate = self._surrogate()
         learner = _Learner(surrogate) if surrogate else None
-        allowed = Allowed(self._config.edits)
+        tries = Tries(self._config.retry, self._config.edits)
         x = node_features(hunt.clean)
-        for _ in range(hunt.edit_budget):
+        left = hunt.edit_budget
+        while left:
             if hunt.over:
                 return hunt.over
-            pool = self._perturbation.propose(
-                hunt.best, POOL_FACTOR * self._config.queries_per_edit, allowed, rng)
+            size = tries.step_size(left)
+            pool = tries.pool(self._perturbation, hunt.best,
+                              POOL_FACTOR * size * self._config.queries_per_edit, rng)
             if not len(pool):
                 return 'no flip left to try'
-            self._step(hunt, pool, allowed, learner, x)
+            self._commit(hunt, self._queried(hunt, pool, size, tries, learner, x), size, tries)
+            left -= size
         return hunt.over or 'edit budget spent'
 
-    def _step(self, hunt: Hunt, pool: NDArray[np.int64], allowed: Allowed,
-              learner: _Learner | None, x: NDArray[np.float64]) -> None:
-        """Query flips of the pool, the most promising first, and commit the best."""
+    def _queried(self, hunt: Hunt, pool: NDArray[np.int64], size: int, tries: Tries,
+                 learner: _Learner | None, x: NDArray[np.float64]) -> list[_Queried]:
+        """Return what the detector says of flips of the pool, the most promising asked first."""
         check_time()
-        before = hunt.best
+        before, found = hunt.best, list[_Queried]()
         features = (flip_features(before, x, pool, self._config.wl_iterations,
                                   pooled=self._config.wl_features == 'pooled') if learner
                     else None)
         waiting = list(range(len(pool)))
-        best: tuple[float, bool, MultiTierGraph] | None = None
-        for asked in range(min(self._config.queries_per_edit, len(pool))):
+        count = min(size * self._config.queries_per_edit, hunt.oracle.left)
+        if size > 1 and count > 1:
+            count -= 1  # several flips at once take a query of their own
+        for asked in range(min(count, len(pool))):
             if learner and features is not None and (learner.refit() or not asked):
                 waiting = learner.ranked(features, waiting)
             place = waiting.pop(0)
-            allowed.mark(before, pool[place:place + 1])
-            flipped = before.flip(pool[place:place + 1])
+            tries.asking(before, pool[place])
             try:
-                loss, succeeded = hunt.ask(flipped)
+                loss, succeeded = hunt.ask(before.flip(pool[place:place + 1]))
             except BudgetError:
                 break
             if learner and features is not None:
                 learner.learn(features[place], loss - hunt.loss)
-            if best is None or loss > best[0]:
-                best = loss, succeeded, flipped
+            tries.asked(pool[place], loss - hunt.loss)
+            found.append(_Queried(pool[place:place + 1], loss, succeeded))
             if succeeded:
                 break
+        return found
+
+    @staticmethod
+    def _commit(hunt: Hunt, found: list[_Queried], size: int, tries: Tries) -> None:
+        """Make the best flip part of the graph, or the best few if they are better together."""
         # A flip that lowers the loss is never committed; one without effect is, since a hard
         # oracle shows no effect before the decision turns.
-        if best is not None and (best[1] or best[0] >= hunt.loss):
-            hunt.keep(best[2], best[0], best[1])
+        chosen = sorted((one for one in found if one.succeeded or one.loss >= hunt.loss),
+                        key=lambda one: (not one.succeeded, -one.loss))[:size]
+        if not chosen:
+            return
+        before, pairs = hunt.best, chosen[0].pairs
+        hunt.keep(before.flip(pairs), chosen[0].loss, chosen[0].succeeded)
+        if len(chosen) > 1 and not hunt.over:
+            together = np.concatenate([one.pairs for one in chosen])
+            graph = before.flip(together)
+            loss, succeeded = hunt.ask(graph)
+            if succeeded or loss >= hunt.loss:
+                pairs = together
+                hunt.keep(graph, loss, succeeded)
+        tries.committed(pairs)
 
     def guess(self, graph: MultiTierGraph, edit_budget: int,
               rng: np.random.Generator) -> MultiTierGraph:

@@ -30,7 +30,8 @@ class Regressor(Surrogate):
         self._scaler = StandardScaler().fit(features)
         scaled = standardise(self._scaler, features)
         self._model = self._make(scaled)
-        self._model.fit(scaled, (gain - gain.mean()) / gain.std())
+        self._mean, self._deviation = float(gain.mean()), float(gain.std())
+        self._model.fit(scaled, (gain - self._mean) / self._deviation)
         return True
 
     def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
