@@ -204,6 +204,17 @@ class LcdConfig(Config):
     geometric_threshold_px: float = setting(
         3.0, 'Geometric check: largest distance of a match from its epipolar line, pixels.',
         low=0.01, high=1000.0)
+    geometric_hull: float = setting(
+        0.0, 'Geometric check: least share of the frame, of either, that the convex hull of the '
+        'matches that agree covers; 0: not looked at.', low=0.0, high=1.0)
+    length_factor: float = setting(
+        2.0, 'Length check: how many times as long as in one frame an edge that recurs may be in '
+        'the other.', low=1.0, high=1000.0)
+    length_slack: float = setting(
+        0.01, 'Length check: what is added to that, over the image diagonal.', low=0.0, high=1.0)
+    rederive_neighbours: int = setting(
+        6, 'Rederive, rederive_check: nearest features that a feature is joined with, as '
+        'feature_neighbours of graph_builder.', low=0, high=50)
     hard_answers: bool = setting(
         False, 'Answer queries with the decision only, not with the probability.')
     max_keyframes: int = setting(

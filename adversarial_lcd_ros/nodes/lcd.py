@@ -20,6 +20,7 @@ from typing import Any
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
@@ -75,11 +76,21 @@ class LcdNode(PipelineNode):
         self.diagnostics.count('received graphs')
         graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
         self._watch.note(graph)
+        self._note_edges(graph)
         decision = replace(self.detector.detect(graph), session=self.session)
         self._decisions.publish(wrap(codec.encode_loop_closure(decision)))
         self.diagnostics.count('published loop closures')
         self.diagnostics.count('loops declared', int(decision.is_loop))
         self.diagnostics.time(time.perf_counter() - arrival_s)
+
+    def _note_edges(self, graph: MultiTierGraph) -> None:
+        strange = self.detector.judging.scoring.unexplained(graph)
+        if strange:
+            self.diagnostics.count('graphs with unexplained edges')
+            self.diagnostics.worry(
+                'unexplained edges', f'{strange} of {graph.edge_count} edges do not follow from '
+                'the nodes: somebody changed them, or graph_builder has another '
+                'feature_neighbours than rederive_neighbours here', strange)
 
     def _on_query(self, wire: bytes) -> None:
         # Decisions first: however many queries wait, a graph waits for one of them at most.
