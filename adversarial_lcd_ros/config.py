@@ -388,6 +388,9 @@ class GraphBuilderNodeConfig(Config):
     detections_wait_ms: float = setting(
         300.0, 'Detector topic: a frame waits so long for its detections, milliseconds; then its '
         'graph goes out without objects. At most queue_depth frames wait.', low=0.0, high=1e6)
+    key: str = setting(
+        '', 'File of a key, as "adversarial-lcd key" makes it: graphs are sealed with it; empty: '
+        'they are not.')
 
 
 @dataclass(frozen=True)
@@ -399,6 +402,12 @@ class LcdNodeConfig(Config):
     max_queries_per_s: int = setting(
         10_000, 'Queries beyond so many in a second are refused. Graphs that wait are decided '
         'before any query in any case.', low=1, high=10_000_000)
+    key: str = setting(
+        '', 'File of the key of graph_builder: graphs that are not sealed with it, or come again, '
+        'late or out of order, are refused; empty: all are taken.')
+    max_age_s: float = setting(
+        10.0, 'Under a key: graphs sealed longer ago, or ahead, are refused, seconds by the '
+        'clocks of both machines; 0: not looked at.', low=0.0, high=1e6)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from adversarial_lcd_ros.errors import CodecError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.authentic import Gate
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
@@ -30,6 +31,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
     overridable,
     payload_qos,
 )
+from adversarial_lcd_ros.nodes.parameters import load_key
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.preloading import load_for_detector
@@ -52,6 +54,8 @@ class LcdNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         config, node_config, self._limits = self.settings
+        key = load_key(node_config.key)
+        self._gate = Gate(key, node_config.max_age_s, self._limits) if key else None
         self.detector = LoopClosureDetector(config)
         self.say('compiling')
         load_for_detector(config)
@@ -74,7 +78,9 @@ class LcdNode(PipelineNode):
     def _on_graph(self, wire: bytes) -> None:
         arrival_s = time.perf_counter()
         self.diagnostics.count('received graphs')
-        graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
+        payload = unwrap(wire, self._limits.max_payload_bytes)
+        graph = (self._gate.take(payload) if self._gate
+                 else codec.decode_graph(payload, self._limits))
         self._watch.note(graph)
         self._note_edges(graph)
         decision = replace(self.detector.detect(graph), session=self.session)
