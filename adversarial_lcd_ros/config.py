@@ -205,6 +205,17 @@ class LcdConfig(Config):
     geometric_threshold_px: float = setting(
         3.0, 'Geometric check: largest distance of a match from its epipolar line, pixels.',
         low=0.01, high=1000.0)
+    geometric_hull: float = setting(
+        0.0, 'Geometric check: least share of the frame, of either, that the convex hull of the '
+        'matches that agree covers; 0: not looked at.', low=0.0, high=1.0)
+    length_factor: float = setting(
+        2.0, 'Length check: how many times as long as in one frame an edge that recurs may be in '
+        'the other.', low=1.0, high=1000.0)
+    length_slack: float = setting(
+        0.01, 'Length check: what is added to that, over the image diagonal.', low=0.0, high=1.0)
+    rederive_neighbours: int = setting(
+        6, 'Rederive, rederive_check: nearest features that a feature is joined with, as '
+        'feature_neighbours of graph_builder.', low=0, high=50)
     hard_answers: bool = setting(
         False, 'Answer queries with the decision only, not with the probability.')
     max_keyframes: int = setting(
@@ -384,6 +395,9 @@ class GraphBuilderNodeConfig(Config):
     detections_wait_ms: float = setting(
         300.0, 'Detector topic: a frame waits so long for its detections, milliseconds; then its '
         'graph goes out without objects. At most queue_depth frames wait.', low=0.0, high=1e6)
+    key: str = setting(
+        '', 'File of a key, as "adversarial-lcd key" makes it: graphs are sealed with it; empty: '
+        'they are not.')
 
 
 @dataclass(frozen=True)
@@ -395,6 +409,12 @@ class LcdNodeConfig(Config):
     max_queries_per_s: int = setting(
         10_000, 'Queries beyond so many in a second are refused. Graphs that wait are decided '
         'before any query in any case.', low=1, high=10_000_000)
+    key: str = setting(
+        '', 'File of the key of graph_builder: graphs that are not sealed with it, or come again, '
+        'late or out of order, are refused; empty: all are taken.')
+    max_age_s: float = setting(
+        10.0, 'Under a key: graphs sealed longer ago, or ahead, are refused, seconds by the '
+        'clocks of both machines; 0: not looked at.', low=0.0, high=1e6)
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,9 @@ TARGETS = Table('target', 'lcd.targets.base:Target', {
 DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
     NONE: '',
     'geometric_check': 'geometric_check:GeometricCheck',
+    'length_check': 'length_check:LengthCheck',
+    'rederive': 'rederive:Rederive',
+    'rederive_check': 'rederive:RederiveCheck',
 }, 'defences')
 
 SEARCHES = Table('search', 'attack.search:Search', {

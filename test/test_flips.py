@@ -23,6 +23,10 @@ SETTINGS = {
     'plain': {}, 'geometric check': {'geometric_check': True, 'geometric_inliers': 15},
     **{name: {'defences': f'own_defences:{name}'} for name in (
         'DropsLongEdges', 'DropsAllAtThree', 'IgnoresEdges', 'CountsLikeLengths', 'RefusesEven')},
+    'length check': {'defences': 'length_check', 'length_factor': 1.3},
+    'rederive': {'defences': 'rederive', 'rederive_neighbours': 2},
+    'rederive, length check': {'defences': 'length_check, rederive', 'rederive_neighbours': 2},
+    'hull': {'geometric_check': True, 'geometric_inliers': 8, 'geometric_hull': 0.9},
     'several': {'defences': 'own_defences:CountsLikeLengths, own_defences:DropsLongEdges',
                 'geometric_check': True, 'geometric_inliers': 15}}
 

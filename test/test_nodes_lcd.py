@@ -7,7 +7,11 @@ from graph_factory import make_graph
 import numpy as np
 import pytest
 
+from adversarial_lcd_ros.edge_rule import joined_pairs
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.files.keys import make_key, read_key
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.sealing import Sealer
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
@@ -149,3 +153,43 @@ def test_diagnostics_tell_keyframes_and_refusals(ros, lcd):
     assert (values['keyframes'], values['received graphs'], values['refused graph']) == (
         '1', '2', '1')
     assert status.name.startswith('lcd: ')
+
+
+def test_under_a_key_only_sealed_graphs_count(ros, lcd_model, tmp_path):
+    make_key(tmp_path / 'key')
+    lcd = ros.start(LcdNode, model=lcd_model, min_gap_s=2, key=str(tmp_path / 'key'))
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    sealer = Sealer(read_key(tmp_path / 'key'))
+    sealed = [sealer.seal(codec.encode_graph(graph(index), 5)) for index in range(4)]
+    changed = sealed[2].replace(graph(2).edge_length.tobytes(),
+                                (graph(2).edge_length + np.float32(1e-6)).tobytes())
+    for payload in (sealed[0], sealed[1], codec.encode_graph(graph(2)), changed, sealed[1],
+                    Sealer(bytes(32)).seal(sealed[2]), sealed[3], sealed[2]):
+        graphs.publish(wrap(payload))
+    ros.until(lambda: lcd.diagnostics['refused graph'] == 5)
+    assert [decision.sequence for decision in decisions] == [0, 1, 3]
+    assert {cause: lcd.diagnostics[f'refused graph: {cause}'] for cause in (
+        'unsealed', 'seal', 'replayed', 'reordered')} == {
+            'unsealed': 1, 'seal': 2, 'replayed': 1, 'reordered': 1}
+
+
+def test_a_key_that_cannot_be_used_ends_the_start(ros, lcd_model, tmp_path):
+    with pytest.raises(ConfigError, match=r'parameter key: .*nowhere cannot be read'):
+        ros.start(LcdNode, model=lcd_model, key=str(tmp_path / 'nowhere'))
+
+
+def test_edges_that_nodes_do_not_explain_are_counted(ros, lcd_model):
+    lcd = ros.start(LcdNode, model=lcd_model, defences='rederive_check')
+    graphs = ros.publisher('graph')
+    ros.matched(graphs)
+    nodes = graph(0)
+    clean = nodes.with_edges(*(lambda edge: (edge, nodes.length_between(edge)))(
+        joined_pairs(nodes.position, nodes.size, nodes.object_count, 6)))
+    graphs.publish(wrap(codec.encode_graph(clean)))
+    graphs.publish(wrap(codec.encode_graph(replace(
+        clean.flip([(5, 6), (0, 7), (30, 31)]), stamp_ns=SECOND, sequence=1))))
+    ros.until(lambda: lcd.diagnostics['published loop closures'] == 2)
+    assert lcd.diagnostics['unexplained edges'] == 3
+    assert lcd.diagnostics['graphs with unexplained edges'] == 1

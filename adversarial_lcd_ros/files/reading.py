@@ -7,8 +7,9 @@ a FileError of one line. Only regular files are read: a device or a pipe may nev
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import csv
+from functools import partial
 import json
 import math
 import os
@@ -28,7 +29,30 @@ MAX_YAML_NODES = 50_000
 _MAX_CSV_CELL = 1 << 16
 
 
-def read_bytes(path: Path, limit: int = MAX_TEXT_BYTES) -> bytes:
+def read_private(path: Path, limit: int) -> bytes:
+    """
+    Return the content of a file that nobody but its owner, this user or root, can open.
+
+    Raises
+    ------
+    FileError
+        As ``read_bytes``; or it is somebody else's, or open to others.
+
+    """
+    return read_bytes(path, limit, check=partial(_check_private, path))
+
+
+def _check_private(path: Path, status: os.stat_result) -> None:
+    if status.st_uid not in (0, os.geteuid()):
+        raise FileError(f'{path} belongs to user {status.st_uid}: expected a file of this user, '
+                        'or of root')
+    if status.st_mode & 0o077:
+        raise FileError(f'{path} is open to others (mode {stat.S_IMODE(status.st_mode):03o}): '
+                        f'expected 600, by "chmod 600 {path}"')
+
+
+def read_bytes(path: Path, limit: int = MAX_TEXT_BYTES,
+               check: Callable[[os.stat_result], None] | None = None) -> bytes:
     """
     Return the content of a regular file.
 
@@ -37,6 +61,8 @@ def read_bytes(path: Path, limit: int = MAX_TEXT_BYTES) -> bytes:
     path : Path
     limit : int
         Most bytes.
+    check : callable, optional
+        Looks at the status of the file that was opened, and may raise.
 
     Raises
     ------
@@ -48,9 +74,12 @@ def read_bytes(path: Path, limit: int = MAX_TEXT_BYTES) -> bytes:
         # Without O_NONBLOCK, opening a pipe that nobody writes to would wait for ever.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with open(descriptor, 'rb') as stream:
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
                 raise FileError(f'{path} is no regular file: expected one, neither a folder nor a '
                                 'device or pipe')
+            if check:
+                check(status)
             data = stream.read(limit + 1)
     except OSError as error:
         raise FileError(f'{path} cannot be read: {error.strerror}') from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -17,9 +18,34 @@ LEAST_MATCHES = 8
 CONFIDENCE, ROUNDS = 0.999, 1000
 
 
-def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> int:
+@dataclass(frozen=True)
+class Inliers:
     """
-    Return how many matched features of two frames fit one fundamental matrix.
+    Matched features of two frames that fit one fundamental matrix.
+
+    Attributes
+    ----------
+    count : int
+    cover : float
+        Share of the frame that their convex hull covers, of the frame where it is smaller.
+
+    """
+
+    count: int
+    cover: float
+
+
+NONE = Inliers(0, 0.0)
+
+
+def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> int:
+    """Return how many matched features of two frames fit one fundamental matrix."""
+    return find_inliers(one, other, threshold_px).count
+
+
+def find_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> Inliers:
+    """
+    Return the matched features of two frames that fit one fundamental matrix.
 
     Edges are not looked at. Matches are mutual nearest neighbours within 64 of 256 bits; the
     matrix is found by USAC or, where OpenCV's cannot go on, by its plain RANSAC. The draws of
@@ -35,7 +61,7 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
     first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
                               lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
     if len(first) < LEAST_MATCHES:
-        return 0
+        return NONE
     points = [graph.position[graph.object_count + rows].astype(np.float64)
               for graph, rows in ((one, first), (other, second))]
     try:
@@ -47,7 +73,19 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
         # up on all of them; RANSAC does not refine.
         matrix, inlier = _fundamental(points, cv2.FM_RANSAC, threshold_px)
     # None where the matches determine no matrix, as unrelated ones on one line.
-    return 0 if matrix is None else int(np.count_nonzero(inlier))
+    if matrix is None:
+        return NONE
+    agree = inlier.ravel() != 0
+    return Inliers(int(agree.sum()), min(
+        _hull(at[agree]) / (graph.width * graph.height)
+        for graph, at in zip((one, other), points, strict=True)))
+
+
+def _hull(points: NDArray[np.float64]) -> float:
+    """Return the area of the convex hull of some points, square pixels."""
+    if not len(points):
+        return 0.0
+    return float(cv2.contourArea(cv2.convexHull(points.astype(np.float32))))
 
 
 def _fundamental(points: Sequence[NDArray[np.float64]], method: int, threshold_px: float

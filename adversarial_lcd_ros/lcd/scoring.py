@@ -96,6 +96,10 @@ class Scoring:
         """Return how far a loop between two graphs as received is borne out; 1: it stands."""
         return min((defence.support(query, match) for defence in self.defences), default=1.0)
 
+    def unexplained(self, graph: MultiTierGraph) -> int:
+        """Return how many edges of a graph as received defences have no explanation for."""
+        return max((defence.unexplained(graph) for defence in self.defences), default=0)
+
     @property
     def changes_graphs(self) -> bool:
         """Whether a defence may judge another graph than the one received."""

@@ -30,6 +30,7 @@ from adversarial_lcd_ros.messages.schemas import load, schema_version
 from adversarial_lcd_ros.messages.schemas import message_type as _type
 from adversarial_lcd_ros.messages.schemas import schema_text as schema_text
 from adversarial_lcd_ros.messages.schemas import typestore as typestore
+from adversarial_lcd_ros.messages.sealing import unsealed
 from adversarial_lcd_ros.messages.types import (
     AttackReport,
     FrameDetections,
@@ -81,13 +82,15 @@ def decode_graph(payload: bytes | bytearray | memoryview,
     """
     Return the graph in a payload after every count, index and range has been checked.
 
+    A seal behind it is not looked at: ``authentic.Gate`` does that.
+
     Raises
     ------
     CodecError
         The payload is no MultiTierGraph, larger than the limits, or contradicts itself.
 
     """
-    return _graph(_load(payload, 'MultiTierGraph', limits), limits)
+    return _graph(_load(unsealed(payload), 'MultiTierGraph', limits), limits)
 
 
 def _graph_message(graph: MultiTierGraph, session: int | None = None) -> Any:

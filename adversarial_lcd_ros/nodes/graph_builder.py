@@ -32,12 +32,14 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.messages.checks import checked_name, checked_stamp_ns
 from adversarial_lcd_ros.messages.codec import decode_detections, encode_graph
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
+from adversarial_lcd_ros.messages.sealing import Sealer
 from adversarial_lcd_ros.nodes.endpoints import (
     MirroredSubscription,
     create_payload_publisher,
     steady_timer,
 )
 from adversarial_lcd_ros.nodes.images import compressed_pixels, image_pixels
+from adversarial_lcd_ros.nodes.parameters import load_key
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import StampWatch
 from adversarial_lcd_ros.preloading import load_for_builder
@@ -81,6 +83,8 @@ class GraphBuilderNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         config, node_config, self._limits = self.settings
+        key = load_key(node_config.key)
+        self._sealer = Sealer(key) if key else None
         self._builder = GraphBuilder(config, node_config.frames_at_once)
         self.say('compiling')
         load_for_builder()
@@ -162,7 +166,8 @@ class GraphBuilderNode(PipelineNode):
     def _publish(self, frame: _Frame) -> None:
         """Publish a graph; waits for it if need be."""
         graph = frame.building.graph()
-        self._graphs.publish(wrap(encode_graph(graph, self.session)))
+        payload = encode_graph(graph, self.session)
+        self._graphs.publish(wrap(self._sealer.seal(payload) if self._sealer else payload))
         self.diagnostics.count('published graphs')
         self.diagnostics.time(time.perf_counter() - frame.arrival_s)
         self._look_for_objects(graph)

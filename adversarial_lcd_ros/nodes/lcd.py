@@ -20,8 +20,10 @@ from typing import Any
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros.errors import CodecError
+from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.authentic import Gate
 from adversarial_lcd_ros.messages.payload import unwrap, wrap
 from adversarial_lcd_ros.nodes.decisions import PlainDecisions
 from adversarial_lcd_ros.nodes.endpoints import (
@@ -30,6 +32,7 @@ from adversarial_lcd_ros.nodes.endpoints import (
     overridable,
     payload_qos,
 )
+from adversarial_lcd_ros.nodes.parameters import load_key
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import GraphWatch
 from adversarial_lcd_ros.preloading import load_for_detector
@@ -54,6 +57,8 @@ class LcdNode(PipelineNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         config, node_config, self._limits = self.settings
+        key = load_key(node_config.key)
+        self._gate = Gate(key, node_config.max_age_s, self._limits) if key else None
         self.detector = LoopClosureDetector(config)
         self.say('compiling')
         load_for_detector(config)
@@ -77,14 +82,26 @@ class LcdNode(PipelineNode):
     def _on_graph(self, wire: bytes) -> None:
         arrival_s = time.perf_counter()
         self.diagnostics.count('received graphs')
-        graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
+        payload = unwrap(wire, self._limits.max_payload_bytes)
+        graph = (self._gate.take(payload) if self._gate
+                 else codec.decode_graph(payload, self._limits))
         self._watch.note(graph)
+        self._note_edges(graph)
         decision = replace(self.detector.detect(graph), session=self.session)
         self._decisions.publish(wrap(codec.encode_loop_closure(decision)))
         self._plain.publish(decision)
         self.diagnostics.count('published loop closures')
         self.diagnostics.count('loops declared', int(decision.is_loop))
         self.diagnostics.time(time.perf_counter() - arrival_s)
+
+    def _note_edges(self, graph: MultiTierGraph) -> None:
+        strange = self.detector.judging.scoring.unexplained(graph)
+        if strange:
+            self.diagnostics.count('graphs with unexplained edges')
+            self.diagnostics.worry(
+                'unexplained edges', f'{strange} of {graph.edge_count} edges do not follow from '
+                'the nodes: somebody changed them, or graph_builder has another '
+                'feature_neighbours than rederive_neighbours here', strange)
 
     def _on_query(self, wire: bytes) -> None:
         # Decisions first: however many queries wait, a graph waits for one of them at most.

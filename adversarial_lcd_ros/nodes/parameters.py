@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, fields
+from pathlib import Path
 import sys
 from typing import Any
 
@@ -17,7 +18,8 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from adversarial_lcd_ros.config import Config
-from adversarial_lcd_ros.errors import ConfigError, with_suggestions
+from adversarial_lcd_ros.errors import ConfigError, FileError, with_suggestions
+from adversarial_lcd_ros.files.keys import read_key
 from adversarial_lcd_ros.settings import limits
 
 # Declared by rclpy itself, on every node.
@@ -28,6 +30,14 @@ _KINDS = ('publisher', 'subscription')
 _POLICIES: Mapping[str, tuple[str, ...]] = {
     'history': ('keep_last', 'keep_all'), 'depth': (),
     'reliability': ('reliable', 'best_effort'), 'durability': ('volatile', 'transient_local')}
+
+
+def load_key(path: str) -> bytes | None:
+    """Return the key in a file that a parameter names, None for no name; raises ConfigError."""
+    try:
+        return read_key(Path(path)) if path else None
+    except FileError as error:
+        raise ConfigError(f'parameter key: {error}') from error
 
 
 def declare(node: Node, configs: Sequence[type[Config]]) -> list[Any]:

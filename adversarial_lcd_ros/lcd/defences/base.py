@@ -3,8 +3,9 @@ What every defence has in common; the least that one of your own needs.
 
 Subclass ``Defence``, give it a ``name``, and override what it does: ``prepare`` changes a graph
 before anybody looks at it, ``compare`` what counts when two graphs are compared, ``support`` has
-the last word on a loop. The detector, the yardstick that scores all single flips, and the pairs
-that decisions are trained and measured on all come to it through lcd/scoring.py.
+the last word on a loop; ``unexplained`` is for whoever watches. The detector, the yardstick that
+scores all single flips, and the pairs that decisions are trained and measured on all come to it
+through lcd/scoring.py.
 """
 
 from __future__ import annotations
@@ -61,6 +62,10 @@ class Defence:
 
         """
         return nodes
+
+    def unexplained(self, graph: MultiTierGraph) -> int:
+        """Return how many edges of a graph as received cannot be right: said, not judged by."""
+        return 0
 
     def support(self, query: MultiTierGraph, match: MultiTierGraph) -> float:
         """
