@@ -32,12 +32,9 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
         Largest distance from the epipolar line, pixels.
 
     """
-    first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
-                              lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
-    if len(first) < LEAST_MATCHES:
+    points = matched_points(one, other)
+    if len(points[0]) < LEAST_MATCHES:
         return 0
-    points = [graph.position[graph.object_count + rows].astype(np.float64)
-              for graph, rows in ((one, first), (other, second))]
     try:
         matrix, inlier = _fundamental(points, cv2.USAC_DEFAULT, threshold_px)
     except cv2.error:
@@ -45,6 +42,15 @@ def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: floa
         matrix, inlier = _fundamental(points, cv2.FM_RANSAC, threshold_px)
     # None where the matches determine no matrix, as unrelated ones on one line.
     return 0 if matrix is None else int(np.count_nonzero(inlier))
+
+
+def matched_points(one: MultiTierGraph, other: MultiTierGraph
+                   ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where matched features are in both frames, (k, 2) each, pixels."""
+    first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
+                              lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
+    return (one.position[one.object_count + first].astype(np.float64),
+            other.position[other.object_count + second].astype(np.float64))
 
 
 def _fundamental(points: Sequence[NDArray[np.float64]], method: int, threshold_px: float
