@@ -15,6 +15,7 @@ from adversarial_lcd_ros.commands import (
     importing,
     inspect,
     labels,
+    maps,
     params,
     report,
     targets,
@@ -31,6 +32,6 @@ def make_parser() -> ArgumentParser:
     commands = parser.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
                 compare.add, targets.add, train.add, fetch_model.add, compiling.add, clean.add,
-                labels.add, inspect.add, params.add):
+                labels.add, maps.add, inspect.add, params.add):
         add(commands)
     return parser

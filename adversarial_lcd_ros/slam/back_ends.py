@@ -23,8 +23,8 @@ from adversarial_lcd_ros.slam.motions import Motions
 from adversarial_lcd_ros.slam.pose_graph import Factors, PoseGraph, factors_of, poses_of
 
 LEAST_SQUARES, HUBER, CAUCHY, GNC = BACK_ENDS
-# A closure counts as kept if the map feels at least half of it.
-KEPT_WEIGHT = 0.5
+# A closure that counts for less than a tenth of what it would in least squares was rejected.
+KEPT_WEIGHT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
