@@ -25,6 +25,8 @@ from adversarial_lcd_ros.registry import (
 
 MODES = ('query', 'surrogate', 'pass')
 RETRIES = ('never', 'gained', 'set')
+# What makes a map, from the one that believes every closure to the one that leaves out most.
+BACK_ENDS = ('least_squares', 'huber', 'cauchy', 'gnc')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -378,6 +380,66 @@ class LabelConfig(Config):
             if getattr(self, low) >= getattr(self, high):
                 raise ConfigError(f'LabelConfig.{low} = {getattr(self, low)}: expected less than '
                                   f'{high} = {getattr(self, high)}')
+
+
+@dataclass(frozen=True)
+class MapConfig(Config):
+    """What closures do to a map: odometry, front end and back ends (docs/map.md)."""
+
+    title: ClassVar[str] = 'map'
+
+    drift_model: str = setting(
+        'independent', 'Errors of the odometry: drawn at every step (independent), or once for '
+        'the whole run (biased).', choices=('independent', 'biased'))
+    drift_rotation_deg: float = setting(
+        0.2, 'Odometry: standard deviation of a step about each axis, degrees.',
+        low=0.0, high=180.0)
+    drift_rotation_share: float = setting(
+        0.01, 'Odometry: and this share of the rotation of the step.', low=0.0, high=10.0)
+    drift_translation_m: float = setting(
+        0.002, 'Odometry: standard deviation of a step along each axis, metres.',
+        low=0.0, high=1e3)
+    drift_translation_share: float = setting(
+        0.02, 'Odometry: and this share of the length of the step.', low=0.0, high=10.0)
+    trust: float = setting(
+        1.0, 'What a back end takes the errors of the odometry for, as a multiple of what they '
+        'are.', low=1e-3, high=1e3)
+    right_claim: str = setting(
+        'noisy_truth', 'Relative pose that a right closure claims: the true one with noise '
+        '(noisy_truth), or that of the essential matrix of the features (essential).',
+        choices=('noisy_truth', 'essential'))
+    false_claim: str = setting(
+        'identity', 'Relative pose that a false closure claims: the camera is where it was '
+        '(identity), or that of the essential matrix of the features (essential).',
+        choices=('identity', 'essential'))
+    closure_rotation_deg: float = setting(
+        1.0, 'Closures: standard deviation about each axis, degrees.', low=1e-3, high=180.0)
+    closure_translation_m: float = setting(
+        0.05, 'Closures: standard deviation along each axis, metres.', low=1e-6, high=1e3)
+    scene_depth_m: float = setting(
+        2.0, 'Claim essential: depth of the scene that gives the translation its length, metres.',
+        low=1e-3, high=1e4)
+    essential_threshold_px: float = setting(
+        3.0, 'Claim essential: largest distance of a match from its epipolar line, pixels.',
+        low=0.01, high=1000.0)
+    huber: float = setting(
+        1.345, 'Back end huber: standard deviations from which on a closure counts less.',
+        low=1e-3, high=1e6)
+    cauchy: float = setting(
+        2.385, 'Back end cauchy: standard deviations at which a closure counts half.',
+        low=1e-3, high=1e6)
+    gnc_probability: float = setting(
+        0.99, 'Back end gnc: share of right closures that its bound on errors lets pass.',
+        low=0.5, high=0.999999)
+    rpe_s: float = setting(
+        1.0, 'Relative pose error: over pairs of frames this far apart, seconds.',
+        low=1e-3, high=1e6)
+    young_frames: int = setting(
+        0, 'Frames of the young map; 0: up to the first frame that by ground truth has a loop.',
+        low=0, high=1_000_000)
+    draws: int = setting(
+        5, 'Draws of the odometry; intervals are over them.', low=1, high=1000)
+    seed: int = setting(42, 'Seed of all draws.', low=0, high=2**31 - 1)
 
 
 @dataclass(frozen=True)

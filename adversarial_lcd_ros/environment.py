@@ -31,7 +31,8 @@ _DISTRIBUTIONS = {
     'numpy': ('numpy',), 'numba': ('numba',), 'scipy': ('scipy',),
     'scikit-learn': ('scikit-learn',),
     'onnxruntime': ('onnxruntime', 'onnxruntime-gpu'), 'rosbags': ('rosbags',),
-    'mcap': ('mcap',), 'rclpy': ('ros-jazzy-rclpy', 'rclpy'), 'matplotlib': ('matplotlib',)}
+    'mcap': ('mcap',), 'rclpy': ('ros-jazzy-rclpy', 'rclpy'), 'matplotlib': ('matplotlib',),
+    'gtsam': ('gtsam',)}
 
 
 _HERE = Path(__file__).resolve().parent

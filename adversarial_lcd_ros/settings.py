@@ -31,6 +31,7 @@ from adversarial_lcd_ros.config import (
     LabelConfig,
     LcdConfig,
     LcdNodeConfig,
+    MapConfig,
     MessageLimits,
     ReplayConfig,
 )
@@ -48,7 +49,8 @@ NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
     'viewer': (MessageLimits,),
 }
 # The sections of a settings file.
-SECTIONS: Mapping[str, tuple[type[Config], ...]] = {**NODE_CONFIGS, 'labels': (LabelConfig,)}
+SECTIONS: Mapping[str, tuple[type[Config], ...]] = {
+    **NODE_CONFIGS, 'labels': (LabelConfig,), 'map': (MapConfig,)}
 
 # Settings that name trained artefacts, and their files in the folder of a training.
 _TRAINED: Mapping[type[Config], tuple[str, str]] = {

@@ -3,18 +3,20 @@
 from paper_factory import make_row
 from test_report import ATTACKS, COUNT, decide, make_labels, make_runs
 
-from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BACK_ENDS, LabelConfig, LcdConfig, MapConfig
 from adversarial_lcd_ros.evaluation import results
 from adversarial_lcd_ros.evaluation.detectors import run as targets
 from adversarial_lcd_ros.evaluation.labels import run as label_runs
 from adversarial_lcd_ros.evaluation.labels.page import PATH, render_page
+from adversarial_lcd_ros.evaluation.maps.report import report_maps
+from adversarial_lcd_ros.evaluation.maps.summary import summarise_cases
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
 from adversarial_lcd_ros.evaluation.replay.records import make_records, write_records
 from adversarial_lcd_ros.evaluation.replay.report import write_report
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
 from adversarial_lcd_ros.evaluation.store import open_store
 
-KINDS = ('replay', 'frames', 'targets', 'labels')
+KINDS = ('replay', 'frames', 'targets', 'labels', 'map')
 
 
 def replay(path, *, found=range(30, 60), lcd=None, labels=None):
@@ -86,5 +88,34 @@ def folder(path, sections, extra=None):
     return made
 
 
-MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder),
+def map_folder(path, *, off_m=0.5, lcd=None, labels=None):
+    """Return made-up maps of two runs; ``off_m``: how far that under attack is off."""
+    made = folder(path, [MapConfig(), lcd or LcdConfig(), labels or LabelConfig()])
+    truth = [[float(x), float(x % 3), 0.0] for x in range(12)]
+    with open_store(path) as store:
+        for draw in range(2):
+            for run, error_m in (('clean', 0.1), ('attack', off_m)):
+                store.add(f'{run} {draw}', map_case(run, draw, truth, error_m))
+        rows = list(store.rows.values())
+    summary = results.summary_document('map', 1, summarise_cases(rows), {
+        'sequence': 'tour', 'frames': 12, 'first_loop': None, 'period_s': 0.5, 'focal_px': 500.0,
+        'seed': 42, 'shown': ['clean 0', 'attack 0'],
+        'runs': [{'name': run, 'right': 1, 'false': 1, 'untold': 2, 'unlocated': 0}
+                 for run in ('clean', 'attack')]})
+    made.write_json(results.SUMMARY, summary)
+    report_maps(path)
+    return path
+
+
+def map_case(run, draw, truth, error_m):
+    figures = {'ate_m': error_m + 0.01 * draw, 'rpe_m': 0.01, 'rpe_deg': 0.5, 'right_kept': 1,
+               'false_kept': 0, 'duration_s': 0.1, 'kept': [1, 0],
+               'path': [[x + error_m, y, z] for x, y, z in truth]}
+    return {'run': run, 'stage': 'whole', 'frames': 12, 'drift': 1.0, 'draw': draw, 'added': None,
+            'consistent': False, 'missing': None, 'right': 1, 'false': 1, 'unposed': 0,
+            'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures), 'truth': truth,
+            'closures': [[9, 1, False], [11, 2, True]]}
+
+
+MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder, map_folder),
                   strict=True))

@@ -7,7 +7,15 @@ import xml.etree.ElementTree
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 import pytest
-from results_factory import KINDS, MAKERS, frames, labels_folder, replay, targets_folder
+from results_factory import (
+    KINDS,
+    MAKERS,
+    frames,
+    labels_folder,
+    map_folder,
+    replay,
+    targets_folder,
+)
 
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
@@ -19,7 +27,7 @@ from adversarial_lcd_ros.evaluation.replay.summary import as_document, from_docu
 
 CHANGED = {'replay': partial(replay, found=range(33, 60)), 'frames': partial(frames, power=0.6),
            'targets': partial(targets_folder, accuracy=0.5),
-           'labels': partial(labels_folder, positive=10)}
+           'labels': partial(labels_folder, positive=10), 'map': partial(map_folder, off_m=2.0)}
 REPORT = {**dict.fromkeys(KINDS, 'report.html'), 'targets': 'target.md'}
 every_kind = pytest.mark.parametrize('kind', KINDS)
 
@@ -70,7 +78,7 @@ def test_inspect_shows_what_is_in_it(tmp_path, capsys, kind):
     assert main(['inspect', str(folder)]) == 0
     said = capsys.readouterr().out
     assert f'results of the kind "{kind}"' in said
-    assert ('700' if kind == 'labels' else 'balanced') in said
+    assert {'labels': '700', 'map': 'Absolute error'}.get(kind, 'balanced') in said
     assert main(['inspect', str(folder), '--json']) == 0
     found = json.loads(capsys.readouterr().out)
     assert found['rows'] == json.loads((folder / 'summary.json').read_text())['rows']

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
 
-from adversarial_lcd_ros.commands import evaluate_frames
+from adversarial_lcd_ros.commands import evaluate_frames, maps
 from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
@@ -26,6 +26,7 @@ from adversarial_lcd_ros.config import (
     BuilderConfig,
     LabelConfig,
     LcdConfig,
+    MapConfig,
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError
@@ -49,7 +50,7 @@ LIVE_WINDOW = 4
 LIVE_TIMEOUT_S = 600.0
 # A class, and what its options start with where another class of the command has the name too.
 EVALUATED = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (AttackConfig, ''),
-             (LabelConfig, 'label-'), (ReplayConfig, 'replay-'))
+             (LabelConfig, 'label-'), (ReplayConfig, 'replay-'), (MapConfig, maps.PREFIX))
 
 
 def add(commands: Commands) -> None:
@@ -95,6 +96,8 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
     parser.add_argument('--sweep-labels', action='store_true',
                         help='show whether the conclusion hangs on the thresholds of the labels '
                         '(also label_sweep.csv)')
+    parser.add_argument('--map', action='store_true',
+                        help='make maps of the closures, too, as "map" does')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
     add_json_option(parser)
@@ -150,6 +153,8 @@ def _plan(options: Namespace) -> Plan:
     problem = ros_problem()
     if problem:
         raise ConfigError(problem)
+    if options.map:
+        maps.check(options)
 
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan
@@ -166,6 +171,8 @@ def _plan(options: Namespace) -> Plan:
 def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 
+    if options.map:
+        maps.check_source(bag)
     folder, summary = evaluate_live(bag, options.output, plan, command_line=sys.argv, tell=tell,
                                     keep_recordings=options.keep_recordings)
     _show(folder, summary, options)
@@ -178,13 +185,17 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
     from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
+    made = maps.make(folder, options) if options.map else None
     if options.json:
-        print_json({'folder': str(folder), **as_document(summary)})
+        print_json({'folder': str(folder), **as_document(summary),
+                    **({} if made is None else {'map': made})})
         return
     console = make_console()
     print_lines(*replay_lines(summary))
     if 'label_sweep' in summary:
         console.print(sweep_table(summary))
+    if made is not None:
+        maps.show_runs(made)
     console.print(headline(summary))
     if is_labelled(summary):
         console.print(f'Labels by {summary["told_by"]}.', soft_wrap=True)

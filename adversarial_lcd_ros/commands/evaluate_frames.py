@@ -96,7 +96,7 @@ def run(options: Namespace) -> None:
 
 
 def _check(options: Namespace) -> None:
-    for name in ('rebuild', 'keep_recordings', 'sweep_labels'):
+    for name in ('rebuild', 'keep_recordings', 'sweep_labels', 'map'):
         if getattr(options, name):
             raise ConfigError(f'--{name.replace("_", "-")} belongs to recipes that replay a bag; '
                               f'{options.recipe} attacks a sample of frames without recording')

@@ -22,6 +22,7 @@ from adversarial_lcd_ros.commands import (
     inspect,
     key,
     labels,
+    maps,
     params,
     report,
     targets,
@@ -69,7 +70,7 @@ def make_parser() -> Parser:
     commands = base.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
                 compare.add, targets.add, train.add, fetch_model.add, compiling.add, clean.add,
-                labels.add, inspect.add, convert.add, params.add, key.add):
+                labels.add, maps.add, inspect.add, convert.add, params.add, key.add):
         add(commands)
     return parser
 

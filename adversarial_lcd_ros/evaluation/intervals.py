@@ -4,12 +4,16 @@ How sure a figure is: intervals that respect that neighbouring frames are near c
 Frames of a video are not independent, so the bootstrap resamples blocks of consecutive frames:
 the circular block bootstrap of Politis and Romano (1992), percentile intervals. Both runs are
 taken over the same blocks, so the interval of a decline is that of the paired difference.
+Independent repeats, such as draws or sequences, have Student's interval of their mean.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
@@ -116,3 +120,13 @@ def _block_sums(value: NDArray[np.int64], block: int) -> NDArray[np.int64]:
     running = np.concatenate([[0], np.cumsum(np.concatenate([value, value[:block - 1]]))])
     sums: NDArray[np.int64] = running[block:] - running[:len(value)]
     return sums
+
+
+def mean_interval(values: NDArray[np.float64], level: float = LEVEL) -> Interval | None:
+    """Return Student's interval of the mean of independent values; None for fewer than two."""
+    count = len(values)
+    if count < 2:
+        return None
+    mean, spread = float(values.mean()), float(values.std(ddof=1))
+    half = float(stats.t.ppf((1.0 + level) / 2, count - 1)) * spread / math.sqrt(count)
+    return mean - half, mean + half

@@ -58,12 +58,9 @@ def find_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float
         Largest distance from the epipolar line, pixels.
 
     """
-    first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
-                              lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
-    if len(first) < LEAST_MATCHES:
+    points = matched_points(one, other)
+    if len(points[0]) < LEAST_MATCHES:
         return NONE
-    points = [graph.position[graph.object_count + rows].astype(np.float64)
-              for graph, rows in ((one, first), (other, second))]
     try:
         matrix, inlier = _fundamental(points, cv2.USAC_DEFAULT, threshold_px)
     except cv2.error:
@@ -86,6 +83,15 @@ def _hull(points: NDArray[np.float64]) -> float:
     if not len(points):
         return 0.0
     return float(cv2.contourArea(cv2.convexHull(points.astype(np.float32))))
+
+
+def matched_points(one: MultiTierGraph, other: MultiTierGraph
+                   ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where matched features are in both frames, (k, 2) each, pixels."""
+    first, second, _ = mutual(lanes(one.descriptor[one.object_count:]),
+                              lanes(other.descriptor[other.object_count:]), MAX_HAMMING)
+    return (one.position[one.object_count + first].astype(np.float64),
+            other.position[other.object_count + second].astype(np.float64))
 
 
 def _fundamental(points: Sequence[NDArray[np.float64]], method: int, threshold_px: float

@@ -15,6 +15,7 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
 from adversarial_lcd_ros.evaluation.kinds.frames import FramesResults
 from adversarial_lcd_ros.evaluation.kinds.labels import LabelsResults
+from adversarial_lcd_ros.evaluation.kinds.maps import MapResults
 from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
 from adversarial_lcd_ros.evaluation.kinds.targets import TargetsResults
 from adversarial_lcd_ros.evaluation.results import (
@@ -25,7 +26,7 @@ from adversarial_lcd_ros.evaluation.results import (
 )
 
 KINDS: Mapping[str, ResultsKind] = {kind.name: kind for kind in (
-    ReplayResults(), FramesResults(), TargetsResults(), LabelsResults())}
+    ReplayResults(), FramesResults(), TargetsResults(), LabelsResults(), MapResults())}
 
 
 def is_results(path: Path) -> bool:

@@ -17,6 +17,7 @@ from adversarial_lcd_ros.evaluation.kinds.base import (
     ResultsKind,
     check_columns,
 )
+from adversarial_lcd_ros.evaluation.maps.report import map_sections
 from adversarial_lcd_ros.evaluation.replay.report import report_folder
 from adversarial_lcd_ros.evaluation.replay.summary import KIND, SCHEMA, from_document
 from adversarial_lcd_ros.evaluation.results import SUMMARY
@@ -54,8 +55,8 @@ class ReplayResults(ResultsKind):
             check_columns(path, f'attack {row["name"]}', row, _ATTACK)
 
     def report(self, results: Results) -> Path:
-        """Write report.html."""
-        return report_folder(results.folder)
+        """Write report.html, with the maps where there are any."""
+        return report_folder(results.folder, map_sections(results.folder))
 
     def tables(self, results: Results) -> list[FigureTable]:
         """Return the tables that "evaluate" prints."""

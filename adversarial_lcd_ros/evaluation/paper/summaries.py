@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
@@ -278,15 +277,13 @@ def _optima(cells: Iterable[Summary]) -> dict[tuple[Hashable, ...], float]:
 def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...], float]
                     ) -> Summary:
     declines = np.array([cell['decline_pp'] for cell in cells])
-    count, mean = len(declines), float(declines.mean())
-    half = (float(stats.t.ppf(0.975, count - 1) * declines.std(ddof=1) / math.sqrt(count))
-            if count > 1 else None)
+    ci95 = intervals.mean_interval(declines)
     both = [(cell['decline_pp'], best[_yardstick(cell)]) for cell in cells
             if _yardstick(cell) in best]
     taken, possible = (math.fsum(column) for column in zip(*both, strict=True)) if both else (0, 0)
     return {
-        'sequences': [cell['sequence'] for cell in cells], 'decline_pp': mean,
-        'ci95': None if half is None else (max(mean - half, -100.0), min(mean + half, 100.0)),
+        'sequences': [cell['sequence'] for cell in cells], 'decline_pp': float(declines.mean()),
+        'ci95': None if ci95 is None else (max(ci95[0], -100.0), min(ci95[1], 100.0)),
         'least_pp': float(declines.min()), 'most_pp': float(declines.max()),
         'seeds': min(cell['seeds'] for cell in cells),
         'share_of_optimum': taken / possible if possible > 0 else None,

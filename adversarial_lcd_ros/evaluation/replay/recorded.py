@@ -204,7 +204,7 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
     summary['notes'] = notes
     summary['duration_s'] = time.monotonic() - started_s
     folder = ResultsFolder.create(output)
-    folder.write_setup([lcd, labels], command_line, seed)
+    folder.write_setup([lcd, labels], command_line, seed, {'source': str(bag.resolve())})
     write_results(folder, summary, records, telling_pictures(
         sequence, Recording(run.clean, run.clean, list(clean), []), {RECORDED: run}, records,
         summary))

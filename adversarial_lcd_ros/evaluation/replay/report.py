@@ -80,9 +80,15 @@ def write_results(folder: ResultsFolder, summary: Mapping[str, Any],
     write_report(folder.path, summary, records, pictures)
 
 
-def report_folder(folder: Path) -> Path:
+def report_folder(folder: Path, sections: Sequence[str] = ()) -> Path:
     """
     Write report.html of a results folder anew from what is in it; return its path.
+
+    Parameters
+    ----------
+    folder : Path
+    sections : sequence of str
+        More sections, HTML as templates of this package made it, after the declines.
 
     Raises
     ------
@@ -92,7 +98,7 @@ def report_folder(folder: Path) -> Path:
     """
     try:
         return _render(folder, from_document(read_json(folder / SUMMARY)),
-                       read_records(folder / RECORDS))
+                       read_records(folder / RECORDS), sections)
     except (LookupError, TypeError, ValueError, AttributeError, TemplateError) as error:
         # Files may lack anything, or hold it in another form: no list of checks is complete.
         detail = f'{type(error).__name__}: {error}'
@@ -100,7 +106,8 @@ def report_folder(folder: Path) -> Path:
                               f'({detail}): evaluate anew') from error
 
 
-def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord]) -> Path:
+def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRecord],
+            sections: Sequence[str] = ()) -> Path:
     runs = runs_of(records)
     names = [CLEAN, *(attack['name'] for attack in summary['attacks'])]
     if list(runs) != names:
@@ -129,7 +136,7 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
                                     'svg+xml'),
         'pictures': [(title, caption, data_uri(data, 'jpeg'))
                      for title, caption, data in read_pictures(folder)],
-        'sample': _sample(summary), 'by_poses': (BY_POSES, BY_INDEX),
+        'sections': sections, 'sample': _sample(summary), 'by_poses': (BY_POSES, BY_INDEX),
         'told_by': summary.get('told_by') or 'ground truth', 'configuration': configuration,
         'command_line': shlex.join(configuration['command_line']),
         'environment': read_json(folder / ENVIRONMENT)}

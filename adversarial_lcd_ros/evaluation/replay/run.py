@@ -158,7 +158,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         if plan.sweep_labels:
             write_sweep(folder.path / SWEEP, summary['label_sweep'])
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
-        _write(folder, plan, summary, records, command_line, domain,
+        _write(folder, plan, summary, records, command_line,
+               {'ros_domain_id': domain, 'source': str(bag.resolve())},
                telling_pictures(sequence, clean, runs, records, summary))
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
@@ -304,9 +305,9 @@ def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]
 
 
 def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
-           records: Sequence[QueryRecord], command_line: Sequence[str], domain: int,
-           pictures: Sequence[Picture]) -> None:
+           records: Sequence[QueryRecord], command_line: Sequence[str],
+           extra: Mapping[str, Any], pictures: Sequence[Picture]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed,
-                       {'ros_domain_id': domain})
+                       extra)
     write_results(folder, summary, records, pictures)

@@ -1,0 +1,145 @@
+"""adversarial-lcd map: what the closures of a replay do to the map."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from contextlib import ExitStack
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_json_option,
+    make_console,
+    print_json,
+    print_rows,
+    progress_bar,
+)
+from adversarial_lcd_ros.config import MapConfig
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.settings import add_config_options, config_from_options
+
+PREFIX = 'map-'
+
+
+def add(commands: Commands) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands, 'map', 'Make maps of the closures that a replay declared, clean and attacked, '
+        'and report how far they are off.', _map)
+    parser.usage = f'{parser.prog} [RESULTS] [OPTIONS]'
+    parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
+                        metavar='RESULTS', help='results folder of a replay (default: '
+                        '%(default)s); a folder "map" is made in it, and what is finished there '
+                        'is not made again')
+    parser.add_argument('--sequence', metavar='SEQUENCE', help='the sequence that was replayed, '
+                        'where the results do not say, or it has moved')
+    parser.add_argument('--export-g2o', type=Path, metavar='FOLDER', help='write the pose graph '
+                        'of every run there, for any solver that reads g2o, and make no maps')
+    parser.add_argument('--jobs', type=int, metavar='N',
+                        help='processes (default: one for each core)')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML); options of the command line win over it')
+    parser.add_argument('--sweeps', action='store_true', help='vary the drift, add false '
+                        'closures, and leave out right ones, too')
+    add_json_option(parser)
+    add_config_options(parser, MapConfig, PREFIX)
+
+
+def check(options: Namespace) -> None:
+    """Raise ConfigError if settings are wrong, or gtsam is missing: before anything takes long."""
+    from adversarial_lcd_ros.slam.library import gtsam
+
+    config_from_options(options, MapConfig)
+    gtsam()
+
+
+def check_source(sequence: Path) -> None:
+    """Raise EvaluationError if no maps can be made of a sequence."""
+    from adversarial_lcd_ros.evaluation.maps.inputs import has_metres
+
+    has_metres(sequence)
+
+
+def _map(options: Namespace) -> None:
+    if options.export_g2o is not None:
+        _export(options)
+        return
+    summary = make(options.folder, options, source=options.sequence, sweeps=options.sweeps,
+                   jobs=options.jobs)
+    if options.json:
+        print_json({'folder': str(options.folder), **summary})
+        return
+    show(options.folder, summary)
+
+
+def make(folder: Path, options: Namespace, *, source: str | None = None,
+         sweeps: bool = False, jobs: int | None = None) -> dict[str, Any]:
+    """Make the maps of a results folder and put them into its report; return their summary."""
+    from adversarial_lcd_ros.evaluation.kinds import open_results
+    from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
+    from adversarial_lcd_ros.evaluation.maps.report import FOLDER, report_maps
+    from adversarial_lcd_ros.evaluation.maps.run import make_maps
+    from adversarial_lcd_ros.evaluation.workers import local_workers
+
+    kind, results = open_results(folder)
+    if kind.name != ReplayResults.name:
+        raise ConfigError(f'{folder} has results of the kind "{kind.name}": maps are made of '
+                          f'the kind "{ReplayResults.name}", every frame of a sequence')
+    if jobs is not None and jobs < 1:
+        raise ConfigError(f'--jobs {jobs}: expected 1 or more')
+    with _Bars() as bars, local_workers(jobs or os.cpu_count() or 1) as workers:
+        summary = make_maps(folder, config_from_options(options, MapConfig), workers,
+                            source=source, sweeps=sweeps, command_line=sys.argv, progress=bars)
+    report_maps(folder / FOLDER)
+    kind.report(results)
+    return summary
+
+
+class _Bars(ExitStack):
+    """One bar after the other, each shown once there is something to show."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shown = ''
+
+    def __call__(self, what: str) -> Callable[[int, int], None]:
+        """Return what is called with the work done and the whole."""
+        def tell(done: int, total: int) -> None:
+            if self._shown != what:
+                self.close()
+                self._shown, self._tell = what, self.enter_context(progress_bar(what))
+            self._tell(done, total)
+        return tell
+
+
+def show(folder: Path, summary: dict[str, Any]) -> None:
+    """Print the tables of maps."""
+    from adversarial_lcd_ros.evaluation.maps.tables import all_tables
+
+    for title, rows in all_tables(summary):
+        print_rows(title, rows)
+    make_console().print(f'report: {folder / "report.html"}', soft_wrap=True)
+
+
+def show_runs(summary: dict[str, Any]) -> None:
+    """Print the errors of the runs alone."""
+    from adversarial_lcd_ros.evaluation.maps.tables import run_tables
+
+    for title, rows in run_tables(summary):
+        print_rows(title, rows)
+
+
+def _export(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.maps.run import export_g2o
+
+    with _Bars() as bars:
+        paths = list(export_g2o(options.folder, options.export_g2o,
+                                config_from_options(options, MapConfig),
+                                source=options.sequence, progress=bars))
+    for path in paths:
+        print(path)

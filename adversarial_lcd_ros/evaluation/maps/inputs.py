@@ -1,0 +1,243 @@
+"""What a map is made of: the true path, and the closures that every run of a replay declared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import BuilderConfig, ConfigT, LabelConfig
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.replay.records import (
+    CLEAN,
+    QueryRecord,
+    column,
+    read_records,
+    runs_of,
+)
+from adversarial_lcd_ros.evaluation.results import CONFIGURATION, RECORDS, read_json
+from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
+from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
+from adversarial_lcd_ros.ground_truth.labels import FrameLabels, located_poses
+from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory, open_sequence
+from adversarial_lcd_ros.sequences.sequence import Progress
+from adversarial_lcd_ros.slam.closures import Pairs
+from adversarial_lcd_ros.slam.motions import Motions, of_trajectory
+
+SOURCE = 'source'  # where configuration.json says which sequence was replayed
+LEAST_FRAMES = 3
+
+
+@dataclass(frozen=True)
+class Declared:
+    """
+    The closures of a run.
+
+    Attributes
+    ----------
+    pairs : Pairs
+        Right ones, and those that certainly name another place.
+    untold : int
+        Of neither kind: no edges of the map.
+    unlocated : int
+        With a frame that has no ground truth pose.
+
+    """
+
+    pairs: Pairs
+    untold: int
+    unlocated: int
+
+
+@dataclass(frozen=True, eq=False)
+class MapInputs:
+    """
+    A replayed sequence, for maps.
+
+    Attributes
+    ----------
+    name : str
+        Of the sequence.
+    source : str
+        What it was opened from.
+    frame : int64, (n,)
+        Frames with a ground truth pose, as the records count them; all else counts these.
+    stamp_ns : int64, (n,)
+    truth : float64, (n, 4, 4)
+        Camera to world.
+    runs : mapping of str to Declared
+        The clean run first.
+    elsewhere : bool, (n, n)
+        Pairs that certainly show different places, the older frame old enough to be a match.
+    first_loop : int or None
+        The first frame that by ground truth has a loop; None without one.
+    focal_px : float
+
+    """
+
+    name: str
+    source: str
+    frame: NDArray[np.int64]
+    stamp_ns: NDArray[np.int64]
+    truth: Motions
+    runs: Mapping[str, Declared]
+    elsewhere: NDArray[np.bool_]
+    first_loop: int | None
+    focal_px: float
+
+    @property
+    def period_s(self) -> float:
+        """Median time from frame to frame, seconds."""
+        return float(np.median(np.diff(self.stamp_ns))) / 1e9
+
+
+def read_inputs(folder: Path, name: str, source: str | None = None,
+                progress: Progress | None = None) -> MapInputs:
+    """
+    Return what the maps of a results folder are made of.
+
+    Parameters
+    ----------
+    folder : Path
+        Results of a replay, of the kind "replay".
+    name : str
+        Of the sequence.
+    source : str, optional
+        The sequence, where it is not where the folder says, or the folder does not say.
+    progress : callable, optional
+        Called with frames labelled and in all.
+
+    Raises
+    ------
+    ConfigError
+        Nobody says which sequence it was.
+    EvaluationError
+        The sequence is another one, or has no poses in metres.
+
+    """
+    configuration = read_json(folder / CONFIGURATION)
+    source = source or configuration.get(SOURCE)
+    if not source:
+        raise ConfigError(f'{folder / CONFIGURATION} does not say which sequence was replayed: '
+                          'name it with --sequence')
+    records = runs_of(read_records(folder / RECORDS))
+    clean = records[CLEAN]
+    views, focal_px = _views(Path(source), column(clean, 'stamp_ns'),
+                             section_of(configuration, LabelConfig))
+    labels = label_views(views, section_of(configuration, LabelConfig), progress).labels
+    _check_same(labels, clean, source)
+    poses, located = located_poses(views.trajectory, labels.stamp_ns,
+                                   section_of(configuration, LabelConfig))
+    frame = np.flatnonzero(located)
+    if len(frame) < LEAST_FRAMES:
+        raise EvaluationError(f'{source}: {len(frame)} frames with a ground truth pose: expected '
+                              f'{LEAST_FRAMES} or more for a map')
+    loops = np.flatnonzero(labels.kind[frame] > 0)
+    old = np.arange(len(located))[None, :] < labels.candidates[:, None]
+    return MapInputs(
+        name, source, frame, labels.stamp_ns[frame], of_trajectory(poses)[frame],
+        {run: _declared(rows, labels, frame) for run, rows in records.items()},
+        (labels.elsewhere & old)[np.ix_(frame, frame)], int(loops[0]) if len(loops) else None,
+        focal_px)
+
+
+def section_of(configuration: Mapping[str, Any], kind: type[ConfigT]) -> ConfigT:
+    """Return settings of a results folder, its first ones of a class; defaults without any."""
+    for section in configuration.get('settings', ()):
+        if section['section'] == kind.title:
+            return kind.from_mapping(section['values'])
+    return kind()
+
+
+def has_metres(source: Path) -> None:
+    """Raise EvaluationError if a sequence has no poses of which maps could be made."""
+    opened = open_graphs(str(source)) if holds_graphs(source) else open_sequence(source)
+    _in_metres(opened.trajectory, source)
+
+
+def _in_metres(trajectory: Trajectory | None, source: Path) -> Trajectory:
+    if trajectory is None or trajectory.frame_id == PLACE_INDEX:
+        raise EvaluationError(f'{source} has no poses in metres: without them nobody knows how '
+                              'far a map is off')
+    return trajectory
+
+
+def _views(source: Path, stamps: NDArray[np.int64],
+           labels: LabelConfig) -> tuple[Views, float]:
+    """Return the frames to label, and their focal length, pixels; no graph is built."""
+    if holds_graphs(source):
+        recorded = open_graphs(str(source))
+        trajectory, size, focal = recorded.trajectory, recorded.image_size, None
+        graphs = chosen_graphs(recorded.graphs, stamps, str(source))
+    else:
+        sequence = open_sequence(source)
+        trajectory, size, focal = (sequence.trajectory, sequence.image_size,
+                                   sequence.focal_length_px)
+        graphs = []
+    return (Views(stamps, size, _in_metres(trajectory, source), source, graphs),
+            focal or labels.focal_length * size[0])
+
+
+def chosen_graphs(graphs: Sequence[MultiTierGraph], stamps: NDArray[np.int64],
+                  source: str) -> list[MultiTierGraph]:
+    """
+    Return the graphs with these stamps.
+
+    Raises
+    ------
+    EvaluationError
+        One is missing.
+
+    """
+    by_stamp = {graph.stamp_ns: graph for graph in graphs}
+    missing = [int(stamp) for stamp in stamps if int(stamp) not in by_stamp]
+    if missing:
+        raise EvaluationError(f'{source} has no frame at {missing[0]} ns, and {len(missing)} such '
+                              'in all: expected the sequence that was replayed')
+    return [by_stamp[int(stamp)] for stamp in stamps]
+
+
+def built_graphs(inputs: MapInputs, folder: Path,
+                 progress: Progress | None = None) -> list[MultiTierGraph]:
+    """Return the clean graphs of the map's frames: read, from the cache, or built."""
+    builder = section_of(read_json(folder / CONFIGURATION), BuilderConfig)
+    return chosen_graphs(open_graphs(inputs.source, builder, progress=progress).graphs,
+                         inputs.stamp_ns, inputs.source)
+
+
+def _check_same(labels: FrameLabels, clean: Sequence[QueryRecord], source: str) -> None:
+    """See that the ground truth says of the frames what it said when they were evaluated."""
+    match = np.array([-1 if record.match_frame is None else record.match_frame
+                      for record in clean], np.int64)
+    right = labels.is_correct(np.arange(len(clean)), match)
+    differing = sum(record.kind != kind or record.match_correct != bool(same)
+                    for record, kind, same in zip(clean, labels.names, right, strict=True))
+    if differing:
+        raise EvaluationError(f'{source}: the ground truth says otherwise of {differing} frames '
+                              'than when they were evaluated: expected the sequence that was '
+                              'replayed, and the same release')
+
+
+def _declared(rows: Sequence[QueryRecord], labels: FrameLabels,
+              frame: NDArray[np.int64]) -> Declared:
+    place = np.full(len(rows), -1)
+    place[frame] = np.arange(len(frame))
+    edges, untold, unlocated = [], 0, 0
+    for record in rows:
+        if not record.is_loop or record.match_frame is None:
+            continue
+        query, match = int(place[record.frame]), int(place[record.match_frame])
+        is_false = bool(labels.elsewhere[record.frame, record.match_frame])
+        if query < 0 or match < 0:
+            unlocated += 1
+        elif record.match_correct or is_false:
+            edges.append((query, match, is_false and not record.match_correct))
+        else:
+            untold += 1
+    table = np.array(edges, np.int64).reshape(-1, 3)
+    return Declared(Pairs(table[:, 0], table[:, 1], table[:, 2].astype(bool)), untold, unlocated)

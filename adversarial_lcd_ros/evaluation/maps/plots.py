@@ -1,0 +1,173 @@
+"""Pictures of maps: paths side by side, and how far each frame is off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.config import BACK_ENDS
+from adversarial_lcd_ros.evaluation.maps.cases import ODOMETRY
+from adversarial_lcd_ros.evaluation.maps.tables import BACK_END_TITLES, metres
+from adversarial_lcd_ros.evaluation.page import CLEAN_COLOUR, GRID, INK, STYLE, attack_colour
+from adversarial_lcd_ros.evaluation.store import Row
+
+# Red is for false closures alone: all maps have one colour.
+TRUTH_COLOUR, ODOMETRY_COLOUR, MAP_COLOUR, FALSE_COLOUR = (
+    '#c9cdd4', '#8c6d46', '#1f4e79', '#d62728')
+_PANEL = 1.9  # inches
+_MARGIN = 0.08  # of the extent, on every side
+_FALSE_WIDTH, _TRUTH_WIDTH, _MAP_WIDTH = 0.7, 2.6, 1.2
+
+
+@dataclass(frozen=True)
+class Shown:
+    """
+    A map to draw.
+
+    Attributes
+    ----------
+    title : str
+        What it is of.
+    colour : str
+        Of the run, in plots over time.
+    case : Row
+        From cells.jsonl, with its paths.
+
+    """
+
+    title: str
+    colour: str
+    case: Row
+
+
+def colour_of(place: int) -> str:
+    """Return the colour of a run by its place among the runs, the clean one first."""
+    return attack_colour(place - 1) if place else CLEAN_COLOUR
+
+
+def flat_axes(path: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the two axes along which a path is longest, in their order."""
+    axes: NDArray[np.int64] = np.sort(np.argsort(np.ptp(path, axis=0))[-2:])
+    return axes
+
+
+def draw_paths(shown: Sequence[Shown], back_ends: Sequence[str] = BACK_ENDS) -> Figure:
+    """
+    Draw odometry and maps over the truth, a row for each run, a column for each back end.
+
+    Declared closures that certainly name another place are red lines between the poses that they
+    pull together, thin where the back end rejected them.
+    """
+    columns = (ODOMETRY, *back_ends)
+    truth = np.array(shown[0].case['truth'])
+    axes = flat_axes(truth)
+    with matplotlib.rc_context(STYLE):
+        size = _panel_size(truth[:, axes])
+        figure = Figure(figsize=(size[0] * len(columns) + 0.3, size[1] * len(shown) + 0.35),
+                        layout='constrained')
+        panels = figure.subplots(len(shown), len(columns), squeeze=False)
+        for row, one in zip(panels, shown, strict=True):
+            for panel, back_end in zip(row, columns, strict=True):
+                draw_map(panel, one, back_end, axes)
+            row[0].set_ylabel(f'{one.title}\n{_closures(one.case)}', fontsize=8.0)
+        for panel, back_end in zip(panels[0], columns, strict=True):
+            panel.set_title(BACK_END_TITLES[back_end], fontsize=9.0)
+    return figure
+
+
+def _panel_size(flat: NDArray[np.float64]) -> tuple[float, float]:
+    wide, high = np.ptp(flat, axis=0) + 1e-9
+    return _PANEL, float(np.clip(_PANEL * high / wide, 0.6 * _PANEL, 1.4 * _PANEL)) + 0.2
+
+
+def _closures(case: Row) -> str:
+    return f'{case["right"]} right, {case["false"]} false'
+
+
+def draw_map(panel: Any, one: Shown, back_end: str, axes: NDArray[np.int64]) -> None:
+    """Draw the map of a back end over the truth into a panel."""
+    truth = np.array(one.case['truth'])[:, axes]
+    found = one.case['back_ends'][back_end]
+    path = np.array(found['path'])[:, axes]
+    is_odometry = back_end == ODOMETRY
+    panel.plot(*truth.T, color=TRUTH_COLOUR, linewidth=_TRUTH_WIDTH, solid_capstyle='round')
+    if not is_odometry:
+        draw_false(panel, one.case['closures'], found['kept'], path)
+    panel.plot(*path.T, color=ODOMETRY_COLOUR if is_odometry else MAP_COLOUR,
+               linewidth=_MAP_WIDTH)
+    # Red where the robot would have been better off without any closure.
+    is_worse = found['ate_m'] > one.case['back_ends'][ODOMETRY]['ate_m']
+    panel.set_xlabel(f'{metres(found["ate_m"])} m', fontsize=8.5,
+                     color=FALSE_COLOUR if is_worse else INK)
+    fix_panel(panel, truth)
+
+
+def draw_false(panel: Any, closures: Sequence[Sequence[Any]], kept: Sequence[int],
+               path: NDArray[np.float64]) -> None:
+    """Draw false closures between the poses that they join."""
+    for value, alpha in ((0, 0.28), (1, 0.9)):
+        lines = [path[[query, match]] for (query, match, is_false), was_kept
+                 in zip(closures, kept, strict=True) if is_false and was_kept == value]
+        panel.add_collection(LineCollection(lines, colors=FALSE_COLOUR, linewidths=_FALSE_WIDTH,
+                                            alpha=alpha))
+
+
+def fix_panel(panel: Any, truth: NDArray[np.float64]) -> None:
+    """Give a panel the extent of the truth, and no ticks."""
+    low, high = truth.min(axis=0), truth.max(axis=0)
+    # A path may leave the picture; its panel stays comparable with the others.
+    margin = max(_MARGIN * float((high - low).max()), 1e-3)
+    panel.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin),
+              xticks=(), yticks=(), aspect='equal')
+    for spine in panel.spines.values():
+        spine.set(visible=True, color=GRID)
+
+
+def draw_errors(shown: Sequence[Shown], time_s: NDArray[np.float64], width: float) -> Figure:
+    """
+    Draw how far every frame is off after alignment, metres, a panel for each back end.
+
+    Parameters
+    ----------
+    shown : sequence of Shown
+        Maps of one stage.
+    time_s : float64, (n,)
+        Of the frames, from the first one.
+    width : float
+        Inches.
+
+    """
+    rows = (len(BACK_ENDS) + 1) // 2
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, 1.75 * rows + 0.3), layout='constrained')
+        panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False).ravel()
+        for panel, back_end in zip(panels, BACK_ENDS, strict=True):
+            odometry = _off(shown[0].case, ODOMETRY)
+            panel.plot(time_s[:len(odometry)], odometry, color=ODOMETRY_COLOUR, linewidth=1.0,
+                       linestyle=(0, (4, 2)))
+            for one in shown:
+                off = _off(one.case, back_end)
+                panel.plot(time_s[:len(off)], off, color=one.colour, linewidth=1.1)
+            panel.set_title(BACK_END_TITLES[back_end], loc='left', fontsize=9.0)
+            panel.set_yscale('log')
+            panel.grid(color=GRID, linewidth=0.6)
+        for panel in panels[::2]:
+            panel.set_ylabel('off, metres')
+        for panel in panels[-2:]:
+            panel.set_xlabel('time in the sequence, seconds')
+    return figure
+
+
+def _off(case: Row, back_end: str) -> NDArray[np.float64]:
+    off = np.linalg.norm(np.array(case['back_ends'][back_end]['path']) - np.array(case['truth']),
+                         axis=1)
+    # The logarithm of nothing: what is below a millimetre was rounded away.
+    shown: NDArray[np.float64] = np.maximum(off, 1e-3)
+    return shown

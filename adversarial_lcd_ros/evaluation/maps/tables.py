@@ -1,0 +1,147 @@
+"""Maps in words and cells, for the terminal and the reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from adversarial_lcd_ros.config import BACK_ENDS
+from adversarial_lcd_ros.evaluation.maps.cases import ODOMETRY, WHOLE, YOUNG
+from adversarial_lcd_ros.evaluation.replay.records import CLEAN
+from adversarial_lcd_ros.evaluation.store import Row
+from adversarial_lcd_ros.evaluation.wording import UNDEFINED, mean_count, number
+
+BACK_END_TITLES: Mapping[str, str] = {
+    ODOMETRY: 'odometry alone',
+    **dict(zip(BACK_ENDS, ('least squares', 'Huber', 'Cauchy', 'GNC'), strict=True))}
+STAGE_TITLES = {YOUNG: 'young map', WHOLE: 'whole run'}
+
+Table = tuple[str, list[dict[str, str]]]
+
+
+def metres(value: float | None) -> str:
+    """Return a length in metres: millimetres below ten metres, else centimetres."""
+    return number(value, 3 if value is None or abs(value) < 10 else 2)
+
+
+def with_interval(value: float | None, bounds: Sequence[float] | None) -> str:
+    """Return metres, with the half width of their interval where there is one."""
+    if value is None or bounds is None:
+        return metres(value)
+    return f'{metres(value)} ± {metres((bounds[1] - bounds[0]) / 2)}'
+
+
+def stage_title(row: Mapping[str, Any]) -> str:
+    """Return which part of the run a map is of."""
+    return f'{STAGE_TITLES[row["stage"]]}, {row["frames"]} frames'
+
+
+def row_title(row: Mapping[str, Any]) -> str:
+    """Return what a map is of, in words that another run has for the same."""
+    parts = [row['run'] if _is_declared(row) else closures_title(row), STAGE_TITLES[row['stage']]]
+    if row['drift'] != 1.0:
+        parts.append(f'{row["drift"]:g} times the drift')
+    return ', '.join(parts)
+
+
+def closures_title(row: Mapping[str, Any]) -> str:
+    """Return which closures a map of a sweep has."""
+    if row['missing'] is not None:
+        return f'{100 * row["missing"]:.0f} % of the right closures missing'
+    kind = 'consistent' if row['consistent'] else 'scattered'
+    return f'{row["added"]} {kind} false closures' if row['added'] else 'right closures alone'
+
+
+def _is_declared(row: Mapping[str, Any]) -> bool:
+    return row['added'] is None and row['missing'] is None
+
+
+def is_main(row: Mapping[str, Any]) -> bool:
+    """Tell whether a row is of a run as it was, and no sweep."""
+    return _is_declared(row) and row['drift'] == 1.0
+
+
+def all_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of a summary: runs by stage, what was kept, then the sweeps."""
+    rows = summary['rows']
+    return [*run_tables(summary), *_kept(rows), *_sweeps(rows)]
+
+
+def run_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Return the errors of the runs as they were, a table for each stage."""
+    return list(_runs(summary['rows']))
+
+
+def _runs(rows: Sequence[Row]) -> Iterator[Table]:
+    main = [row for row in rows if is_main(row)]
+    for stage in dict.fromkeys(row['stage'] for row in main):
+        yield (f'Absolute error in metres, {_stage_of(main, stage)}',
+               [{'run': run, 'closures right / false': _closures(of), **_errors(of)}
+                for run, of in _by(main, 'run', stage).items()])
+
+
+def _kept(rows: Sequence[Row]) -> Iterator[Table]:
+    main = [row for row in rows if is_main(row)]
+    for stage in dict.fromkeys(row['stage'] for row in main):
+        table = [{'run': run, 'back end': BACK_END_TITLES[row['back_end']],
+                  'error more than clean': with_interval(row['excess_m'], row['excess_ci95'])
+                  if run != CLEAN else '',
+                  'right kept': f'{mean_count(row["right_kept"])} of {mean_count(row["right"])}',
+                  'false kept': f'{mean_count(row["false_kept"])} of {mean_count(row["false"])}',
+                  'relative error, m': metres(row['rpe_m']),
+                  'degrees': number(row['rpe_deg'], 2),
+                  'seconds': number(row['duration_s'], 2)}
+                 for run, of in _by(main, 'run', stage).items()
+                 for row in of if row['back_end'] != ODOMETRY]
+        yield f'What back ends kept, {_stage_of(main, stage)}', table
+
+
+def _sweeps(rows: Sequence[Row]) -> Iterator[Table]:
+    drifting = [row for row in rows if _is_declared(row)]
+    if any(row['drift'] != 1.0 for row in drifting):
+        drifted = {(row['run'], row['stage']) for row in drifting if row['drift'] != 1.0}
+        chosen = [row for row in drifting if (row['run'], row['stage']) in drifted]
+        yield 'Absolute error in metres, over the drift of the odometry', [
+            {'run': of[0]['run'], **_map_cells(of[0]), **_errors(of)}
+            for of in _grouped(chosen, 'run', 'stage', 'drift')]
+    for name, title in (('added', 'over the number of false closures'),
+                        ('missing', 'over the share of right closures that are missing')):
+        chosen = [row for row in rows if row[name] is not None]
+        if chosen:
+            yield f'Absolute error in metres, {title}', [
+                {'closures': closures_title(of[0]), **_map_cells(of[0]), **_errors(of)}
+                for of in _grouped(chosen, 'stage', 'drift', 'consistent', name)]
+
+
+def _map_cells(row: Row) -> dict[str, str]:
+    return {'map': STAGE_TITLES[row['stage']], 'drift': f'× {row["drift"]:g}'}
+
+
+def _stage_of(rows: Sequence[Row], stage: str) -> str:
+    return stage_title(next(row for row in rows if row['stage'] == stage))
+
+
+def _by(rows: Sequence[Row], name: str, stage: str) -> dict[str, list[Row]]:
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        if row['stage'] == stage:
+            groups.setdefault(row[name], []).append(row)
+    return groups
+
+
+def _grouped(rows: Sequence[Row], *names: str) -> list[list[Row]]:
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return [groups[key] for key in sorted(groups, key=lambda key: [
+        (value != CLEAN, value != YOUNG, value) if isinstance(value, str) else value
+        for value in key])]
+
+
+def _closures(of: Sequence[Row]) -> str:
+    return f'{mean_count(of[0]["right"])} / {mean_count(of[0]["false"])}'
+
+
+def _errors(of: Sequence[Row]) -> dict[str, str]:
+    found = {row['back_end']: with_interval(row['ate_m'], row['ate_ci95']) for row in of}
+    return {title: found.get(name, UNDEFINED) for name, title in BACK_END_TITLES.items()}

@@ -1,0 +1,234 @@
+"""Maps of a made-up replay, from its results folder to tables, report and g2o."""
+
+import json
+import sys
+
+import bag_factory as make
+from map_factory import wavy
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from test_slam import needs_gtsam
+
+from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.config import BACK_ENDS, AttackConfig, LabelConfig, LcdConfig, MapConfig
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation import results
+from adversarial_lcd_ros.evaluation.maps.inputs import has_metres, read_inputs
+from adversarial_lcd_ros.evaluation.maps.run import ADDED, MISSING, make_maps, pairs_of, plan_cases
+from adversarial_lcd_ros.evaluation.maps.summary import summarise_cases
+from adversarial_lcd_ros.evaluation.replay.records import AttackRun, make_records, write_records
+from adversarial_lcd_ros.evaluation.replay.report import write_report
+from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
+from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
+from adversarial_lcd_ros.sequences import open_sequence
+
+COUNT, LAP = 60, 30
+FIRST = 29  # is back near the start of the path
+LABELS = LabelConfig(rule='distance', min_gap_s=0.1, positive_distance_m=0.3,
+                     negative_distance_m=1.5)
+FALSE = {20: 6, 24: 2, 28: 10}  # before any loop is there
+QUIET = {'draws': 2}
+
+
+def here(function, tasks):
+    yield from map(function, tasks)
+
+
+def decisions(stamps, false):
+    """Return closures of the second lap with the first one, and false ones."""
+    match = {frame: frame - LAP for frame in range(LAP + 2, COUNT)} | false | {15: 13}
+    return [LoopClosure(int(stamp), 'camera', frame, frame in match,
+                        0.9 if frame in match else 0.1,
+                        *((int(stamps[match[frame]]), match[frame]) if frame in match
+                          else (None, None)), candidates=frame)
+            for frame, stamp in enumerate(stamps)]
+
+
+def replayed(tmp_path):
+    """Return the results folder of two laps, clean and with false closures, and the sequence."""
+    source = make.tum_folder(tmp_path / 'laps', COUNT, truth=False)
+    stamps, truth = make.stamps(COUNT), wavy(COUNT, 2)
+    quaternion = Rotation.from_matrix(truth[:, :3, :3]).as_quat()
+    (source / 'groundtruth.txt').write_text('# timestamp tx ty tz qx qy qz qw\n' + ''.join(
+        f'{make.seconds(stamp)} ' + ' '.join(f'{value:.9f}' for value in (*at[:3, 3], *turn))
+        + '\n' for stamp, at, turn in zip(stamps, truth, quaternion, strict=True)))
+    sequence = open_sequence(source)
+    stamps = sequence.stamps_ns
+    labels = label_views(Views(stamps, sequence.image_size, sequence.trajectory, source),
+                         LABELS).labels
+    reports = [AttackReport(int(stamp), 'camera', frame, 'failure', '', 9, 9, 9, 9, -1.0, -1.0,
+                            0.01) for frame, stamp in enumerate(stamps)]
+    records = make_records(labels, decisions(stamps, {}), {
+        'forger': AttackRun(decisions(stamps, FALSE), reports)})
+    folder = tmp_path / 'results'
+    folder.mkdir()
+    made = results.ResultsFolder(folder)
+    made.write_setup([LcdConfig(), LABELS, AttackConfig()], ['adversarial-lcd', 'evaluate'], 1,
+                     {'source': str(source)})
+    summary = summarise('laps', records, {'forger': AttackConfig()},
+                        GraphStatistics.of([300] * COUNT, [900] * COUNT), seed=1)
+    made.write_json(results.SUMMARY, as_document(summary))
+    write_records(folder / results.RECORDS, records)
+    write_report(folder, summary, records, [])
+    return folder
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return replayed(tmp_path_factory.mktemp('maps'))
+
+
+@pytest.fixture(scope='module')
+def inputs(folder):
+    return read_inputs(folder, 'laps')
+
+
+def test_closures_are_right_false_or_cannot_be_told(inputs):
+    clean, forged = inputs.runs['clean'], inputs.runs['forger']
+    assert len(clean.pairs) == COUNT - LAP - 2
+    assert not clean.pairs.is_false.any()
+    assert forged.pairs.query[forged.pairs.is_false].tolist() == sorted(FALSE)
+    # 15 with 13: too near in time to be a loop, too near in space to be another place.
+    assert (clean.untold, forged.untold) == (1, 1)
+    assert np.allclose(inputs.truth, wavy(COUNT, 2), atol=1e-6)
+    assert inputs.first_loop == FIRST
+
+
+def test_another_sequence_is_refused(folder, tmp_path):
+    other = make.tum_folder(tmp_path / 'other', COUNT)
+    with pytest.raises(EvaluationError, match='expected the sequence that was replayed'):
+        read_inputs(folder, 'laps', str(other))
+
+
+def test_results_that_do_not_say_their_sequence_ask_for_it(folder, tmp_path):
+    copy = tmp_path / 'copy'
+    copy.mkdir()
+    for path in folder.glob('*.*'):
+        (copy / path.name).write_bytes(path.read_bytes())
+    document = json.loads((copy / 'configuration.json').read_text())
+    source = document.pop('source')
+    (copy / 'configuration.json').write_text(json.dumps(document))
+    with pytest.raises(ConfigError, match='--sequence'):
+        read_inputs(copy, 'laps')
+    assert read_inputs(copy, 'laps', source).first_loop == FIRST
+
+
+def test_a_sequence_without_poses_in_metres_makes_no_map(tmp_path):
+    with pytest.raises(EvaluationError, match='no poses in metres'):
+        has_metres(make.tum_folder(tmp_path / 'blind', truth=False))
+
+
+def test_young_and_whole_maps_go_draw_by_draw(inputs):
+    cases = list(plan_cases(inputs, MapConfig(draws=2), sweeps=False))
+    assert [(case.draw, case.stage, case.frames, case.run) for case in cases[:4]] == [
+        (0, 'young', FIRST, 'clean'), (0, 'young', FIRST, 'forger'),
+        (0, 'whole', COUNT, 'clean'), (0, 'whole', COUNT, 'forger')]
+    assert [case.draw for case in cases] == [0] * 4 + [1] * 4
+    assert {case.frames for case in plan_cases(inputs, MapConfig(young_frames=12), sweeps=False)
+            } == {12, COUNT}
+
+
+def test_sweeps_add_false_closures_and_leave_out_right_ones(inputs):
+    config = MapConfig(draws=1)
+    cases = list(plan_cases(inputs, config, sweeps=True))
+    assert {case.drift for case in cases} == {1.0, 3.0, 5.0}
+    right = len(inputs.runs['clean'].pairs)
+    for case in cases:
+        pairs = pairs_of(inputs, case, config)
+        if case.added is not None:
+            added = pairs.chosen(pairs.is_false)
+            assert case.consistent or len(added) == case.added
+            assert inputs.elsewhere[added.query, added.match].all()
+            assert (added.query < case.frames).all()
+            if case.consistent:
+                assert len(set((added.query - added.match).tolist())) == 1
+        if case.missing is not None:
+            assert len(pairs) == right - round(case.missing * right)
+    assert {case.added for case in cases} == {None, *ADDED}
+    assert {case.missing for case in cases} == {None, *MISSING}
+
+
+def test_an_excess_is_over_the_same_draws_of_the_clean_run():
+    def case(run, draw, error):
+        figures = {'ate_m': error, 'rpe_m': None, 'rpe_deg': None, 'right_kept': 1,
+                   'false_kept': 0, 'duration_s': 0.1}
+        return {'run': run, 'stage': 'whole', 'frames': 9, 'drift': 1.0, 'draw': draw,
+                'added': None, 'consistent': False, 'missing': None, 'right': 1, 'false': 0,
+                'unposed': 0, 'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures)}
+
+    rows = summarise_cases([case('clean', 0, 1.0), case('forger', 0, 1.5), case('clean', 1, 3.0),
+                            case('forger', 1, 3.5)])
+    row = next(row for row in rows if row['run'] == 'forger' and row['back_end'] == 'gnc')
+    assert (row['ate_m'], row['draws'], row['excess_m']) == (2.5, 2, 0.5)
+    assert row['excess_ci95'] == (0.5, 0.5)
+    # Student's t with one degree of freedom: 12.706 times the standard error, here 1 m.
+    assert row['ate_ci95'] == pytest.approx((2.5 - 12.706, 2.5 + 12.706), abs=1e-3)
+    assert next(row for row in rows if row['run'] == 'clean')['excess_m'] is None
+
+
+@needs_gtsam
+def test_maps_are_made_once_reported_and_shown(folder, capsys):
+    config = MapConfig(**QUIET)
+    made = make_maps(folder, config, here)
+    error = {(row['run'], row['stage'], row['back_end']): row['ate_m'] for row in made['rows']}
+    assert error['forger', 'young', 'least_squares'] > 5 * error['clean', 'young', 'least_squares']
+    assert error['forger', 'young', 'gnc'] < 2 * error['clean', 'young', 'odometry']
+    kept = next(row for row in made['rows'] if (row['run'], row['stage'], row['back_end'])
+                == ('forger', 'whole', 'gnc'))
+    assert (kept['false'], kept['false_kept']) == (3, 0)
+    cells = (folder / 'map' / 'cells.jsonl').read_bytes()
+    assert make_maps(folder, config, here)['rows'] == made['rows']
+    assert (folder / 'map' / 'cells.jsonl').read_bytes() == cells
+
+    def none_left(function, tasks):
+        assert not tasks
+        yield from ()
+
+    make_maps(folder, config, none_left)
+    assert main(['report', str(folder)]) == 0
+    page = (folder / 'report.html').read_text()
+    assert 'What it does to the map' in page
+    assert page.count('Under forger') == 1
+    capsys.readouterr()
+    assert main(['inspect', str(folder / 'map')]) == 0
+    assert 'Absolute error in metres, young map, 29 frames' in capsys.readouterr().out
+
+
+@needs_gtsam
+def test_one_seed_makes_one_map(folder, tmp_path):
+    config = MapConfig(draws=1, seed=7)
+    first, second = (make_maps(folder, config, here)['rows'] for _ in range(2))
+    assert first == second
+    other = make_maps(folder, MapConfig(draws=1, seed=8), here)['rows']
+    assert [row['ate_m'] for row in first] != [row['ate_m'] for row in other]
+
+
+@needs_gtsam
+def test_pose_graphs_are_exported_with_their_truth(folder, tmp_path, capsys):
+    out = tmp_path / 'g2o'
+    assert main(['map', str(folder), '--export-g2o', str(out)]) == 0
+    written = capsys.readouterr().out.splitlines()
+    assert written == [str(out / name) for name in ('clean.g2o', 'forger.g2o', 'truth.tum')]
+    lines = (out / 'forger.g2o').read_text().splitlines()
+    edges = [line for line in lines if line.startswith('EDGE_SE3:QUAT')]
+    assert len(edges) == COUNT - 1 + COUNT - LAP - 2 + len(FALSE)
+    assert len((out / 'truth.tum').read_text().splitlines()) == COUNT
+
+
+def test_results_of_another_kind_make_no_map(tmp_path, capsys):
+    from results_factory import frames
+
+    assert main(['map', str(frames(tmp_path / 'a'))]) == 2
+    assert 'of the kind "frames"' in capsys.readouterr().err
+
+
+def test_a_missing_gtsam_is_told_before_anything_is_replayed(monkeypatch, capsys, tmp_path):
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    monkeypatch.setitem(sys.modules, 'gtsam', None)
+    assert main(['demo', '--map', '--output', str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert 'adversarial_lcd_ros[slam]' in said
+    assert said.count('\n') == 1
+    assert not list(tmp_path.iterdir())
