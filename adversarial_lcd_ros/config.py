@@ -224,8 +224,9 @@ class AttackConfig(Config):
         'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
         'beforehand; pass: forward unchanged.', choices=MODES)
     search: str = setting(
-        'stepwise', 'How flips are looked for: flip after flip as in the paper, or by our own '
-        'recall.', choices=SEARCHES)
+        'stepwise', 'What is changed, and how it is looked for: edges, flip after flip as in the '
+        'paper, or by our own recall; or, beyond the paper, nodes (move_nodes) or the whole graph '
+        '(replay).', choices=SEARCHES)
     perturbation: str = setting(
         'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
@@ -259,6 +260,9 @@ class AttackConfig(Config):
         'both', 'Recall: edges that it replays or erases, those between features or those at '
         'objects; both: the answers tell which, and without queries features.',
         choices=('both', 'features', 'objects'))
+    nodes_moved: int = setting(
+        40, 'Move_nodes: most features that are moved, their edges with them.', low=2,
+        high=100_000)
     edits: str = setting(
         'both', 'Which flips are allowed: add edges, delete edges, or both.',
         choices=('both', 'add', 'delete'))

@@ -281,6 +281,14 @@ class MultiTierGraph:
         length = np.concatenate([self.edge_length[keep], self.length_between(ends)])[order]
         return self._with_edges(edge, length, merged[order])
 
+    def with_edges(self, edge: NDArray[np.uint32], length: NDArray[np.float32]
+                   ) -> MultiTierGraph:
+        """Return the graph with other edges, (m, 2), and their lengths; raises GraphError."""
+        key: NDArray[np.int64] = edge[:, 0].astype(np.int64) * self.node_count + edge[:, 1]
+        graph = self._with_edges(edge, length, key)
+        graph._check_edges(self.node_count)
+        return graph
+
     def _with_edges(self, edge: NDArray[np.uint32], length: NDArray[np.float32],
                     key: NDArray[np.int64]) -> MultiTierGraph:
         """Return this graph with other edges; its nodes need no second check, nor digest."""

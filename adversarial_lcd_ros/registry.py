@@ -173,6 +173,8 @@ DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
 SEARCHES = Table('search', 'attack.search:Search', {
     'stepwise': 'searches.stepwise:Stepwise',
     'recall': 'searches.recall:Recall',
+    'move_nodes': 'searches.move_nodes:MoveNodes',
+    'replay': 'searches.replay:Replay',
 }, 'searches', {'optimum': 'it looks into the detector, and is for recipes of the protocol '
                            '"frames" alone'})
 

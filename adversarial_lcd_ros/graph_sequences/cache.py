@@ -33,7 +33,8 @@ from adversarial_lcd_ros.sequences import Sequence
 
 # What decides on the bytes of a graph: libraries, and code of this package.
 _LIBRARIES = (np, scipy, cv2, onnxruntime, numba)
-_CODE = ('vision', 'graph', 'compiled', 'messages', 'sequences/frame', 'sequences/detections')
+_CODE = ('vision', 'graph', 'edge_rule', 'compiled', 'messages', 'sequences/frame',
+         'sequences/detections')
 _MAX_CACHE_BYTES = 1 << 33
 # Threads change how long a graph takes, not what it is.
 _IRRELEVANT = ('threads',)

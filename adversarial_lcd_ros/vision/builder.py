@@ -9,9 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.edge_rule import joined_pairs
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, OBJECT_TIER, MultiTierGraph
 from adversarial_lcd_ros.paths import model_path, object_model_path
@@ -206,8 +206,7 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
     """
     Return the multi-tier graph of features and objects.
 
-    Edges: every two objects; a feature and every box that holds it, or else the nearest
-    object; a feature and its nearest features. Lengths are distances over the image diagonal.
+    Edges by ``edge_rule.joined_pairs``; lengths are distances over the image diagonal.
 
     Parameters
     ----------
@@ -225,15 +224,9 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
     """
     first = len(objects)
     centre = objects.box[:, :2] + objects.box[:, 2:] / 2
-    pairs = np.concatenate([
-        np.stack(np.triu_indices(first, 1), axis=1),
-        _spokes(features.position, objects.box, centre, first),
-        _neighbour_edges(features.position, neighbours) + first])
-    # As one number each, which sorts several times faster than rows do.
-    count = first + len(features)
-    key = np.unique(pairs[:, 0] * count + pairs[:, 1])
-    edge = np.stack(np.divmod(key, max(count, 1)), axis=1).astype(np.uint32)
     position = np.concatenate([centre, features.position]).astype(np.float32)
+    size = np.concatenate([objects.box[:, 2:], np.repeat(features.size[:, None], 2, axis=1)])
+    edge = joined_pairs(position, size, first, neighbours)
     diagonal = np.float32(np.hypot(width, height))
     offset = position[edge[:, 0]] - position[edge[:, 1]]
     return MultiTierGraph(
@@ -241,37 +234,10 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
         tier=np.repeat([OBJECT_TIER, FEATURE_TIER], [first, len(features)]).astype(np.uint8),
         label=np.concatenate([objects.label, words]).astype(np.uint32),
         position=position,
-        size=np.concatenate([objects.box[:, 2:], np.repeat(features.size[:, None], 2, axis=1)]),
+        size=size,
         score=np.concatenate([objects.score, features.score]),
         descriptor=np.concatenate(
             [np.zeros((first, DESCRIPTOR_BYTES), np.uint8), features.descriptor]),
         edge=edge,
         edge_length=(np.hypot(offset[:, 0], offset[:, 1]) / diagonal).astype(np.float32),
         word=bow[0], word_weight=bow[1])
-
-
-def _spokes(position: NDArray[np.float32], box: NDArray[np.float32],
-            centre: NDArray[np.floating], first: int) -> NDArray[np.int64]:
-    """Return the edges (object, feature), features counted from ``first``, shape (e, 2)."""
-    if not len(box) or not len(position):
-        return np.zeros((0, 2), np.int64)
-    offset = position[:, None] - box[None, :, :2]
-    inside = np.all((offset >= 0) & (offset <= box[None, :, 2:]), axis=2)
-    lost = ~inside.any(axis=1)
-    distance = np.linalg.norm(position[lost, None] - centre[None], axis=2)
-    inside[lost, distance.argmin(axis=1)] = True
-    feature, owner = np.nonzero(inside)
-    return np.stack([owner, feature + first], axis=1)
-
-
-def _neighbour_edges(position: NDArray[np.float32], neighbours: int) -> NDArray[np.int64]:
-    """Return the edges of each feature with its k nearest, source < target, with repeats."""
-    count = len(position)
-    nearest = min(neighbours + 1, count)
-    if nearest < 2:
-        return np.zeros((0, 2), np.int64)
-    _, near = cKDTree(position).query(position, nearest)
-    pairs = np.stack([np.repeat(np.arange(count), nearest), near.ravel()], axis=1)
-    # Features of several octaves share a place: a feature need not be its own first neighbour.
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    return np.sort(pairs, axis=1).astype(np.int64)

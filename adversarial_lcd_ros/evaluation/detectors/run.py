@@ -50,7 +50,7 @@ from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 # Of the row's columns; a change in the code below makes rows again by itself.
 KIND, SCHEMA = 'targets', 4
-_CODE = ('lcd', 'graph', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
+_CODE = ('lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
          'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
          'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')

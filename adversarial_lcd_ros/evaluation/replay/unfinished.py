@@ -21,7 +21,7 @@ _PLAN, _FINISHED = 'plan.json', 'finished.json'
 _BY_NAME = ('target', 'search', 'perturbation', 'surrogate', 'defences')
 # What the nodes of a run are made of: a change in a report does not make runs anew.
 _ROOMS = ('nodes', 'lcd', 'attack', 'vision', 'keyframes', 'compiled', 'weisfeiler_lehman',
-          'sequences', 'poses', 'graph_sequences', 'messages', 'graph', 'config')
+          'sequences', 'poses', 'graph_sequences', 'messages', 'graph', 'edge_rule', 'config')
 
 
 def plan_digest(bag: Path, sections: Mapping[str, Config | None], rebuild: bool) -> str:
