@@ -24,6 +24,7 @@ from adversarial_lcd_ros.registry import (
 )
 
 MODES = ('query', 'surrogate', 'pass')
+POSTERS = (NONE, 'cells', 'noise', 'chessboard')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -292,6 +293,15 @@ class ReplayConfig(Config):
     start_timeout_s: float = setting(
         30.0, 'Wait so long for the other nodes at the start, seconds, and anew while one of '
         'them is loading or compiling. 0: as long as it takes.', low=0.0, high=1e6)
+    poster: str = setting(
+        NONE, 'A poster that is pasted into frames on their way to graph_builder: cells, noise or '
+        'a chessboard.', choices=POSTERS)
+    poster_share: float = setting(
+        0.05, 'Poster: share of the frame that it covers.', low=0.001, high=1.0)
+    poster_spans: str = setting(
+        '', 'Poster: when it is seen, FROM:TO in seconds of the bag, several between commas.')
+    poster_seed: int = setting(
+        42, 'Poster: seed of its texture, place and light.', low=0, high=2**31 - 1)
     timeout_s: float = setting(
         30.0, 'In lockstep wait so long for a decision, and at the end for the rest, seconds.',
         low=0.1, high=1e6)
