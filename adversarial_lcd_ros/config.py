@@ -27,6 +27,7 @@ MODES = ('query', 'surrogate', 'pass')
 RETRIES = ('never', 'gained', 'set')
 # What makes a map, from the one that believes every closure to the one that leaves out most.
 BACK_ENDS = ('least_squares', 'huber', 'cauchy', 'gnc')
+POSTERS = (NONE, 'cells', 'noise', 'chessboard')
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -238,8 +239,9 @@ class AttackConfig(Config):
         'query', 'query: query-guided; surrogate: no queries, stepwise by a surrogate trained '
         'beforehand; pass: forward unchanged.', choices=MODES)
     search: str = setting(
-        'stepwise', 'How flips are looked for: flip after flip as in the paper, by our own '
-        'recall, or by Bayesian optimisation as in GRABNEL.', choices=SEARCHES)
+        'stepwise', 'What is changed, and how it is looked for: edges, flip after flip as in the '
+        'paper, by our own recall, or by Bayesian optimisation as in GRABNEL; or, beyond the '
+        'paper, nodes (move_nodes) or the whole graph (replay).', choices=SEARCHES)
     perturbation: str = setting(
         'eigencentrality', 'Stepwise: how candidate flips are chosen.', choices=PERTURBATIONS)
     surrogate: str = setting(
@@ -278,6 +280,9 @@ class AttackConfig(Config):
         'both', 'Recall: edges that it replays or erases, those between features or those at '
         'objects; both: the answers tell which, and without queries features.',
         choices=('both', 'features', 'objects'))
+    nodes_moved: int = setting(
+        40, 'Move_nodes: most features that are moved, their edges with them.', low=2,
+        high=100_000)
     edits: str = setting(
         'both', 'Which flips are allowed: add edges, delete edges, or both.',
         choices=('both', 'add', 'delete'))
@@ -307,6 +312,15 @@ class ReplayConfig(Config):
     start_timeout_s: float = setting(
         30.0, 'Wait so long for the other nodes at the start, seconds, and anew while one of '
         'them is loading or compiling. 0: as long as it takes.', low=0.0, high=1e6)
+    poster: str = setting(
+        NONE, 'A poster that is pasted into frames on their way to graph_builder: cells, noise or '
+        'a chessboard.', choices=POSTERS)
+    poster_share: float = setting(
+        0.05, 'Poster: share of the frame that it covers.', low=0.001, high=1.0)
+    poster_spans: str = setting(
+        '', 'Poster: when it is seen, FROM:TO in seconds of the bag, several between commas.')
+    poster_seed: int = setting(
+        42, 'Poster: seed of its texture, place and light.', low=0, high=2**31 - 1)
     timeout_s: float = setting(
         30.0, 'In lockstep wait so long for a decision, and at the end for the rest, seconds.',
         low=0.1, high=1e6)

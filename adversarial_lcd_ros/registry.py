@@ -177,6 +177,8 @@ SEARCHES = Table('search', 'attack.search:Search', {
     'stepwise': 'searches.stepwise:Stepwise',
     'recall': 'searches.recall:Recall',
     'grabnel': 'searches.grabnel:Grabnel',
+    'move_nodes': 'searches.move_nodes:MoveNodes',
+    'replay': 'searches.replay:Replay',
 }, 'searches', {'optimum': 'it looks into the detector, and is for recipes of the protocol '
                            '"frames" alone'})
 

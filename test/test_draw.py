@@ -1,5 +1,7 @@
 """Pictures of graphs: size, colours of what was flipped, what is refused."""
 
+from dataclasses import replace
+
 from graph_factory import make_graph
 import numpy as np
 import pytest
@@ -89,5 +91,14 @@ def test_what_does_not_belong_together_is_refused():
         draw_graph(FRAME[:100], scene())
     with pytest.raises(GraphError):
         draw_graph(FRAME, scene(), [(0, 6)])
-    with pytest.raises(GraphError, match='nodes'):
-        draw_attack(FRAME, scene(), FRAME, None, scene(seed=4))
+
+
+def test_moved_nodes_are_shown_with_where_they_came_from():
+    clean = scene()
+    position = clean.position.copy()
+    position[4] = 600, 20
+    picture = draw_attack(FRAME, clean, FRAME, None, replace(clean, position=position))
+    third = picture.shape[1] - 480
+    red = (picture[..., 2] > 180) & (picture[..., :2].max(axis=2) < 110)
+    assert red[:, third + 440:].any()
+    assert not red[:, :third].any()

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from adversarial_lcd_ros.attack.images.posting import Posting
+from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagFile
+from adversarial_lcd_ros.sequences.frame import decode
 from adversarial_lcd_ros.sequences.replay import read_payloads
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
@@ -239,3 +243,25 @@ def test_stopping_ends_the_replay_with_exit_code_0(ros, bag, pipeline):
 def test_a_missing_bag_is_an_error(ros, tmp_path):
     with pytest.raises(SequenceError, match='nowhere'):
         replay(ros, str(tmp_path / 'nowhere'))
+
+
+def test_a_poster_is_in_the_graphs_of_its_span_as_offline(ros, bag, frames, pipeline, vocabulary,
+                                                          tmp_path):
+    settings = {'poster': 'cells', 'poster_share': 0.3, 'poster_spans': '0.3:0.9'}
+    node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'), **settings)
+    assert node.work(ros.spin) == 0
+    ros.stop(node)
+    live = [codec.decode_graph(payload)
+            for _, payload in read_payloads(tmp_path / 'record', 'graph')]
+    posting = Posting(ReplayConfig(**settings), STAMPS[0])
+    config = BuilderConfig(detector='none', vocabulary=vocabulary, features=60)
+    pictures = [decode(codec.typestore().deserialize_cdr(cdr, TYPE).data.tobytes(), 'frame')
+                for cdr in frames]
+    with GraphBuilder(config) as builder:
+        plain, posted = ([builder.build(change(pixels, stamp), stamp, 'camera', number)
+                          for number, (pixels, stamp) in enumerate(
+                              zip(pictures, STAMPS, strict=True))]
+                         for change in (lambda pixels, _: pixels, posting.on_pixels))
+    assert live == posted
+    assert [one != other for one, other in zip(plain, posted, strict=True)] == [
+        300_000_000 <= stamp - STAMPS[0] < 900_000_000 for stamp in STAMPS]

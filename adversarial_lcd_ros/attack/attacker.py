@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.deadline import ending_at
+from adversarial_lcd_ros.attack.forging import Change, change_between
 from adversarial_lcd_ros.attack.oracle import (
     DEADLINE,
     Ask,
     Oracle,
     OracleSilentError,
-    edit_budget,
 )
-from adversarial_lcd_ros.attack.search import Hunt
+from adversarial_lcd_ros.attack.search import Budget, Hunt
 from adversarial_lcd_ros.attack.searches import make_search
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.errors import BudgetError
@@ -51,6 +51,7 @@ class AttackResult:
         Attack loss L of Eq. (1): log odds against the detector's answer to the clean graph.
     trace : tuple of float
         Largest loss after each query.
+    node_budget : int
 
     """
 
@@ -64,18 +65,24 @@ class AttackResult:
     loss_before: float = 0.0
     loss_after: float = 0.0
     trace: tuple[float, ...] = ()
+    node_budget: int = 0
 
     @cached_property
     def flips(self) -> NDArray[np.uint32]:
-        """Pairs that differ between the clean and the forwarded graph, shape (k, 2)."""
+        """Pairs that differ between two graphs of the same nodes, (k, 2); raises GraphError."""
         return self.clean.flips_to(self.perturbed)
+
+    @cached_property
+    def change(self) -> Change:
+        """In how much the clean and the forwarded graph differ."""
+        return change_between(self.clean, self.perturbed)
 
     def report(self, duration_s: float = 0.0) -> AttackReport:
         """Return the message that tells whoever measures the attack."""
         return AttackReport(
             self.clean.stamp_ns, self.clean.frame_id, self.clean.sequence, self.status,
-            self.reason, self.edit_budget, len(self.flips), self.query_budget, self.queries,
-            self.loss_before, self.loss_after, duration_s)
+            self.reason, self.edit_budget, self.change.edits, self.query_budget, self.queries,
+            self.loss_before, self.loss_after, duration_s, self.node_budget, self.change.nodes)
 
 
 class Attacker:
@@ -126,30 +133,32 @@ class Attacker:
             ``time.monotonic()`` at which the attack ends; ``deadline_ms`` from now if not given.
 
         """
-        edits = edit_budget(graph.node_count, self.config.ratio)
-        queries = min(edits * self.config.queries_per_edit, self.config.max_queries)
+        budget = self._search.budget(graph)
+        queries = min((budget.edits or budget.nodes) * self.config.queries_per_edit,
+                      self.config.max_queries)
         if self.config.mode == 'pass':
-            return AttackResult(graph, graph, 'skipped', 'mode is pass', edits)
-        if not edits:
-            return AttackResult(graph, graph, 'skipped', 'edit budget below one')
+            return _skipped(graph, 'mode is pass', budget)
+        if not budget.edits and not budget.nodes:
+            return _skipped(graph, 'edit budget below one', budget)
         rng = np.random.default_rng((self.config.seed, graph.sequence))
         if deadline_s is None:
             deadline_s = (time.monotonic() + self.config.deadline_ms / 1e3
                           if self.config.deadline_ms else math.inf)
         if self.config.mode != 'surrogate' and queries < 2:
-            return AttackResult(graph, graph, 'skipped', 'query budget below two', edits, queries)
+            return _skipped(graph, 'query budget below two', budget, queries)
         with ending_at(deadline_s):
             if self.config.mode == 'surrogate':
-                return self._guess(graph, edits, rng)
-            return self._hunt(graph, edits, Oracle(ask, queries, deadline_s), rng)
+                return self._guess(graph, budget, rng)
+            return self._hunt(graph, budget, Oracle(ask, queries, deadline_s), rng)
 
-    def _guess(self, graph: MultiTierGraph, edits: int, rng: np.random.Generator
+    def _guess(self, graph: MultiTierGraph, budget: Budget, rng: np.random.Generator
                ) -> AttackResult:
         try:
-            guess = self._search.guess(graph, edits, rng)
+            guess = self._search.guess(graph, budget.edits, rng)
         except BudgetError:
-            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
-        return AttackResult(graph, guess, 'failure', 'nobody asked', edits)
+            return _skipped(graph, DEADLINE, budget)
+        return AttackResult(graph, guess, 'failure', 'nobody asked', budget.edits,
+                            node_budget=budget.nodes)
 
     def so_far(self, graph: MultiTierGraph) -> AttackResult:
         """
@@ -159,23 +168,22 @@ class Attacker:
         one takes this.
         """
         hunt, before = self._under_way or (None, 0.0)
-        edits = edit_budget(graph.node_count, self.config.ratio)
         if hunt is None or hunt.clean is not graph:
-            return AttackResult(graph, graph, 'skipped', DEADLINE, edits)
+            return _skipped(graph, DEADLINE, self._search.budget(graph))
         best, loss, succeeded = hunt.kept or (graph, before, False)
-        return AttackResult(graph, best, 'success' if succeeded else 'failure', DEADLINE, edits,
-                            hunt.oracle.budget, hunt.oracle.used, before, loss,
-                            tuple(hunt.trace))
+        return AttackResult(graph, best, 'success' if succeeded else 'failure', DEADLINE,
+                            hunt.edit_budget, hunt.oracle.budget, hunt.oracle.used, before, loss,
+                            tuple(hunt.trace), hunt.node_budget)
 
-    def _hunt(self, graph: MultiTierGraph, edits: int, oracle: Oracle,
+    def _hunt(self, graph: MultiTierGraph, budget: Budget, oracle: Oracle,
               rng: np.random.Generator) -> AttackResult:
         queries = oracle.budget
         try:
-            hunt = Hunt.begin(graph, edits, oracle)
+            hunt = Hunt.begin(graph, budget.edits, oracle, budget.nodes)
         except OracleSilentError:
-            return AttackResult(graph, graph, 'skipped', 'no answer', edits, queries, oracle.used)
+            return _skipped(graph, 'no answer', budget, queries, oracle.used)
         except BudgetError:
-            return AttackResult(graph, graph, 'skipped', oracle.exhausted, edits, queries)
+            return _skipped(graph, oracle.exhausted, budget, queries)
         before = hunt.loss
         self._under_way = hunt, before
         try:
@@ -185,4 +193,11 @@ class Attacker:
         except BudgetError:  # the deadline passed since the search looked
             reason = oracle.exhausted
         return AttackResult(graph, hunt.best, 'success' if hunt.succeeded else 'failure', reason,
-                            edits, queries, oracle.used, before, hunt.loss, tuple(hunt.trace))
+                            budget.edits, queries, oracle.used, before, hunt.loss,
+                            tuple(hunt.trace), budget.nodes)
+
+
+def _skipped(graph: MultiTierGraph, reason: str, budget: Budget, queries: int = 0,
+             used: int = 0) -> AttackResult:
+    return AttackResult(graph, graph, 'skipped', reason, budget.edits, queries, used,
+                        node_budget=budget.nodes)

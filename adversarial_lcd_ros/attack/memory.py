@@ -48,6 +48,27 @@ class Echo:
     at_object: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class Matched:
+    """
+    Features of the present graph that look like some of a past one.
+
+    Attributes
+    ----------
+    past : MultiTierGraph
+    node, place : int64, (k,)
+        Nodes of the present and of the past graph that look alike.
+    alike : float64, (k,)
+        How much, 0 to 1.
+
+    """
+
+    past: MultiTierGraph
+    node: NDArray[np.int64]
+    place: NDArray[np.int64]
+    alike: NDArray[np.float64]
+
+
 class Memory:
     """
     All graphs that passed the man in the middle, as he forwarded them: the detector's map.
@@ -76,9 +97,26 @@ class Memory:
         old = self._database.admissible(graph.stamp_ns, self._gap_ns)
         return list(zip(*self._database.retrieve(graph, old, count), strict=True))
 
+    def young(self, graph: MultiTierGraph, count: int) -> list[MultiTierGraph]:
+        """Return graphs that are too young to be compared with, the oldest first, spread."""
+        young = np.flatnonzero(~self._database.admissible(graph.stamp_ns, self._gap_ns))
+        some = np.linspace(0, len(young) - 1, min(count, len(young))).round().astype(int)
+        return [self._database[int(index)] for index in young[some]]
+
+    def __getitem__(self, index: int) -> MultiTierGraph:
+        """Return a graph of the past."""
+        return self._database[index]
+
     def neighbours(self, index: int) -> range:
         """Return a graph of the past with the ones just before and after it."""
         return range(max(0, index - 1), min(len(self._database), index + 2))
+
+    def matched(self, graph: MultiTierGraph, index: int) -> Matched:
+        """Return the features of a graph and of a past one that are nearest to each other."""
+        past = self._database[index]
+        present, place, distance = mutual(_feature_lanes(graph), self._lanes(index), MAX_HAMMING)
+        return Matched(past, present + graph.object_count, place + past.object_count,
+                       1 - distance / (MAX_HAMMING + 1.0))
 
     def echo(self, graph: MultiTierGraph, index: int) -> Echo:
         """
@@ -87,13 +125,12 @@ class Memory:
         Each step of it takes a quarter of a second of the largest graphs that are let through.
         """
         check_time()
-        past = self._database[index]
+        found = self.matched(graph, index)
+        past = found.past
         # For each node of the past graph: the present one that looks like it, and how much.
         node = np.full(past.node_count, -1, np.int64)
         alike = np.zeros(past.node_count)
-        present, matched, distance = mutual(_feature_lanes(graph), self._lanes(index), MAX_HAMMING)
-        node[matched + past.object_count] = present + graph.object_count
-        alike[matched + past.object_count] = 1 - distance / (MAX_HAMMING + 1.0)
+        node[found.place], alike[found.place] = found.node, found.alike
         check_time()
         rows, columns = _match_objects(graph, past, node, alike)
         node[columns], alike[columns] = rows, 1

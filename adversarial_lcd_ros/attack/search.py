@@ -14,10 +14,29 @@ from typing import ClassVar
 
 import numpy as np
 
-from adversarial_lcd_ros.attack.oracle import Oracle, answer_logit
+from adversarial_lcd_ros.attack.oracle import Oracle, answer_logit, edit_budget
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.shown import Shown
+
+
+@dataclass(frozen=True)
+class Budget:
+    """
+    What may be changed in a graph.
+
+    Attributes
+    ----------
+    edits : int
+        Edges flipped.
+    nodes : int
+        Nodes changed, and their edges with them.
+
+    """
+
+    edits: int = 0
+    nodes: int = 0
+
 
 COMMON_SETTINGS = ('mode', 'search', 'ratio', 'queries_per_edit', 'max_queries', 'deadline_ms',
                    'edits', 'seed')
@@ -46,6 +65,8 @@ class Hunt:
         Largest loss after each query.
     kept : (MultiTierGraph, float, bool), optional
         What ``keep`` was last given, in one piece: for another thread.
+    node_budget : int
+        Most nodes in which ``best`` may differ from ``clean``.
 
     """
 
@@ -59,15 +80,18 @@ class Hunt:
     succeeded: bool = False
     trace: list[float] = field(default_factory=list)
     kept: tuple[MultiTierGraph, float, bool] | None = None
+    node_budget: int = 0
 
     @classmethod
-    def begin(cls, graph: MultiTierGraph, edit_budget: int, oracle: Oracle) -> Hunt:
+    def begin(cls, graph: MultiTierGraph, edit_budget: int, oracle: Oracle,
+              node_budget: int = 0) -> Hunt:
         """Spend the first query on the clean graph."""
         answer = oracle(graph)
         logit = answer_logit(answer)
         return cls(graph, graph, edit_budget, oracle, answer.is_loop,
                    -logit if answer.is_loop else logit,
-                   hopeless=answer.is_soft and answer.log_odds == -math.inf)
+                   hopeless=answer.is_soft and answer.log_odds == -math.inf,
+                   node_budget=node_budget)
 
     @property
     def over(self) -> str:
@@ -109,6 +133,10 @@ class Search(Shown, ABC):
 
     def __init__(self, config: AttackConfig) -> None:
         self.config = config
+
+    def budget(self, graph: MultiTierGraph) -> Budget:
+        """Return what may be changed in a graph; by default floor(r n^2) edges (Sec. 3.3)."""
+        return Budget(edit_budget(graph.node_count, self.config.ratio))
 
     @abstractmethod
     def hunt(self, hunt: Hunt, rng: np.random.Generator) -> str:

@@ -101,8 +101,7 @@ def headline(summary: Mapping[str, Any]) -> str:
     if attack is None:
         return (f'Without an attack the detector reaches a balanced accuracy of '
                 f'{percent(clean["balanced_accuracy"])} on {name}.')
-    effort = (f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
-              'flipped in a graph on average')
+    effort = _effort(summary, attack)
     if attack['decline_pp'] is None:
         kind = 'frames with a loop' if not summary['positives'] else 'frames at a new place'
         return (f'{name} has no {kind}, so no balanced accuracy can be given. With {effort}, '
@@ -208,8 +207,15 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
             f'{attack["changed"]} decisions ({percent(attack["success_rate"])} of the frames that '
             f'could be attacked): loops silenced {attack["silenced"]}, raised {attack["raised"]}, '
             f'declared with another frame {attack["redirected"]}, with '
-            f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
-            f'flipped in a graph on average. {unknown}.')
+            f'{_effort(summary, attack)}. {unknown}.')
+
+
+def _effort(summary: Mapping[str, Any], attack: Attack) -> str:
+    if attack.get('nodes_moved_mean'):
+        return (f'{mean_count(attack["nodes_moved_mean"])} of {number(summary["nodes_mean"], 0)} '
+                'nodes changed in a graph on average')
+    return (f'{mean_count(attack["edits_mean"])} of {number(summary["edges_mean"], 0)} edges '
+            'flipped in a graph on average')
 
 
 def _changes(summary: Mapping[str, Any], attack: Attack) -> str:

@@ -107,6 +107,7 @@ def check_report(report: AttackReport) -> None:
         raise CodecError(f'status {report.status[:40]!r}: expected one of {", ".join(STATUSES)}',
                          cause='status')
     for what, spent, granted in (('edits', report.edits, report.edit_budget),
+                                 ('nodes', report.nodes_moved, report.node_budget),
                                  ('queries', report.queries, report.query_budget)):
         if spent > granted:
             raise CodecError(f'{spent} {what} of {granted} that were granted', cause='budget')

@@ -219,7 +219,8 @@ def decode_answer(payload: bytes | bytearray | memoryview) -> LcdAnswer:
 
 def encode_attack_report(report: AttackReport) -> bytes:
     """Return the CDR of AttackReport.msg."""
-    values = {name: getattr(report, name) for name in _REPORT_FIELDS}
+    values = {name: getattr(report, name) for name in (
+        *_REPORT_FIELDS, 'node_budget', 'nodes_moved')}
     return _dump(_type(f'{PACKAGE}/msg/AttackReport')(
         header=_header(report.stamp_ns, report.frame_id),
         schema_version=schema_version('AttackReport'), **values), 'AttackReport')
@@ -230,7 +231,9 @@ def decode_attack_report(payload: bytes | bytearray | memoryview) -> AttackRepor
     message = _load(payload, 'AttackReport')
     report = AttackReport(
         stamp_ns=_stamp_ns(message.header.stamp), frame_id=_frame_id(message),
-        **{name: getattr(message, name) for name in _REPORT_FIELDS})
+        **{name: getattr(message, name) for name in _REPORT_FIELDS},
+        node_budget=int(getattr(message, 'node_budget', 0)),
+        nodes_moved=int(getattr(message, 'nodes_moved', 0)))
     checked_name(report.reason, 'reason')
     check_report(report)
     return report

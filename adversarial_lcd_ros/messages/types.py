@@ -115,6 +115,8 @@ class AttackReport:
         Attack loss of the clean and of the forwarded graph; above 0 is success.
     duration_s : float
         From the graph's arrival to its publication, seconds.
+    node_budget, nodes_moved : int
+        Nodes that might be changed, and that were; 0 in recordings of version 1.
 
     """
 
@@ -130,6 +132,8 @@ class AttackReport:
     loss_before: float = 0.0
     loss_after: float = 0.0
     duration_s: float = 0.0
+    node_budget: int = 0
+    nodes_moved: int = 0
 
 
 @dataclass(frozen=True, eq=False)

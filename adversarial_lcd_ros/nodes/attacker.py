@@ -136,7 +136,7 @@ class AttackerNode(PipelineNode):
             graph = codec.decode_graph(unwrap(wire, self._limits.max_payload_bytes), self._limits)
             self._watch.note(graph)
             result = self._attack(graph, arrival_s)
-            if len(result.flips):
+            if result.perturbed is not result.clean:
                 forwarded = wrap(codec.encode_graph(result.perturbed))
         except CodecError as error:
             # Dropping what it cannot read would give the man in the middle away.

@@ -19,6 +19,7 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import UInt8MultiArray
 
+from adversarial_lcd_ros.attack.images.posting import Posting
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, unwrap
@@ -53,7 +54,11 @@ class Stopped(Exception):  # noqa: N818
 
 
 class BagReplayNode(PipelineNode):
-    """Publishes the messages of a bag byte for byte, and may record what comes of them."""
+    """
+    Publishes the messages of a bag byte for byte, and may record what comes of them.
+
+    With a poster, frames of the spans that it is seen in are changed, and nothing else.
+    """
 
     default_name = 'bag_replay'
     configs = NODE_CONFIGS['bag_replay']
@@ -72,6 +77,7 @@ class BagReplayNode(PipelineNode):
         if not node_config.bag:
             raise ConfigError('parameter bag is empty: give the bag to replay, -p bag:=PATH')
         self._replay = Replay(Path(node_config.bag), self._config)
+        self._posting = Posting(self._config, self._replay.first_ns)
         self._outputs = {topic: self._open(topic, message_type)
                             for topic, message_type in self._replay.topics.items()}
         self._clock_output = (self.create_publisher(Clock, '/clock', 10)
@@ -164,6 +170,7 @@ class BagReplayNode(PipelineNode):
             self._tell_time(stamp_ns)
             self._time_ns = stamp_ns
             if is_frame:
+                cdr = self._posting.on_message(kind, stamp_ns, cdr)
                 self._under_way[stamp_ns] = time.monotonic()
                 self._strangers.sent(stamp_ns)
                 self._published += 1

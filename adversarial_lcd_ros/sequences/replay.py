@@ -69,6 +69,8 @@ class Replay:
         The topic of the frames.
     frame_count : int
         Frames of the whole replay, loops included.
+    first_ns : int
+        Stamp of the bag's first frame.
 
     Raises
     ------
@@ -93,6 +95,7 @@ class Replay:
                            for topic, kind in self._types.items()}
             self.frame_topics = (self._frame_topic,)
             stamps = _frame_stamps(bag, self._frame_topic)
+        self.first_ns = int(stamps[0])
         self._select(stamps)
         self.frame_count = len(self._kept) * config.loop
 

@@ -95,7 +95,9 @@ def draw_attack(query: NDArray[np.uint8], clean: MultiTierGraph, match: NDArray[
                 match_graph: MultiTierGraph | None, perturbed: MultiTierGraph,
                 caption: str = '') -> NDArray[np.uint8]:
     """
-    Return three panels side by side: query, match, attacked graph with its flips in red.
+    Return three panels side by side: query, match, attacked graph with what was changed in red.
+
+    Of features that were moved a dashed line shows where from.
 
     Parameters
     ----------
@@ -120,12 +122,15 @@ def draw_attack(query: NDArray[np.uint8], clean: MultiTierGraph, match: NDArray[
     Raises
     ------
     GraphError
-        An image and its graph differ in size, or the graphs differ in their nodes.
+        An image and its graph differ in size.
 
     """
-    flips = clean.flips_to(perturbed)
+    same = clean.node_digest == perturbed.node_digest
+    flips = clean.flips_to(perturbed) if same else None
+    moves = None if same or clean.node_count != perturbed.node_count else np.stack(
+        [clean.position, perturbed.position], axis=1)
     panels = [('query', _panel(query, clean)), ('match', _panel(match, match_graph)),
-              ('attacked graph', _panel(query, perturbed, flips))]
+              ('attacked graph', _panel(query, perturbed, flips, moves))]
     return _side_by_side(panels, [(caption, _INK)] if caption else [])
 
 
@@ -187,7 +192,8 @@ def _resized(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.ui
 
 
 def _panel(image: NDArray[np.uint8], graph: MultiTierGraph | None,
-           flips: ArrayLike | None = None) -> NDArray[np.uint8]:
+           flips: ArrayLike | None = None,
+           moves: NDArray[np.float32] | None = None) -> NDArray[np.uint8]:
     """Return a picture that fits a panel, centred on paper."""
     height, width = image.shape[:2]
     scale = min(_PANEL_WIDTH / width, _PANEL_HEIGHT / height)
@@ -195,11 +201,20 @@ def _panel(image: NDArray[np.uint8], graph: MultiTierGraph | None,
         drawn = _resized(image, round(scale * width), round(scale * height))
     else:
         drawn = draw_graph(image, graph, flips, scale=scale)
+        if moves is not None:
+            _draw_moves(drawn, scale * moves)
     panel = np.full((_PANEL_HEIGHT, _PANEL_WIDTH, 3), _PAPER, np.uint8)
     top = (_PANEL_HEIGHT - drawn.shape[0]) // 2
     left = (_PANEL_WIDTH - drawn.shape[1]) // 2
     panel[top:top + drawn.shape[0], left:left + drawn.shape[1]] = drawn
     return panel
+
+
+def _draw_moves(canvas: NDArray[np.uint8], moves: NDArray[np.float32]) -> None:
+    """Draw where nodes were moved from and to, (n, 2, 2) pixels; those that stay are left out."""
+    for before, after in moves[(moves[:, 0] != moves[:, 1]).any(axis=1)]:
+        _segments(canvas, _dashes(before, after), _FLIPPED, 1)
+        cv2.circle(canvas, np.rint(after).astype(int).tolist(), 3, _FLIPPED, -1, cv2.LINE_AA)
 
 
 def _with_edges(canvas: NDArray[np.uint8], graph: MultiTierGraph,

@@ -85,12 +85,13 @@ class Views:
         query = self._picture(stamp_ns)
         assert query is not None
         try:
-            flips = None if clean is None else clean.flips_to(graph)
+            known = clean is not None and clean.node_digest == graph.node_digest
+            flips = clean.flips_to(graph) if clean is not None and known else None
             drawn = draw_decision(
                 query, graph, flips, self._picture(decision.match_stamp_ns), verdict(decision),
                 why(decision, clean, graph, report),
                 is_loop=decision.is_loop)
-        except GraphError:  # of images of another size, or of a clean graph of other nodes
+        except GraphError:  # of images of another size
             return None
         return Frame.of_pixels(stamp_ns, drawn).compressed(JPEG)
 
@@ -117,7 +118,10 @@ def why(decision: LoopClosure, clean: MultiTierGraph | None, graph: MultiTierGra
         report: AttackReport | None) -> str:
     """Return what the decision rests on, and what an attacker did about it, in a line."""
     words = [f'{decision.candidates} candidates, words alike by {decision.vbow_score:.3f}']
-    if clean is not None:
+    if clean is not None and clean.node_digest != graph.node_digest:
+        words.append(f'attacker changed {report.nodes_moved} nodes' if report is not None else
+                     'attacker changed nodes')
+    elif clean is not None:
         flips = clean.flips_to(graph)
         added = int(np.count_nonzero(graph.has_edges(flips)))
         words.append(f'attacker added {added} edges and deleted {len(flips) - added}')

@@ -254,9 +254,11 @@ def _said_of(decision: LoopClosure, match_is: NDArray[np.str_], index_of: dict[i
 def _check_budgets(result: AttackResult, queries: int) -> None:
     # Counted here once more, on the graphs and at the detector: a figure of an attack that
     # overspends is a figure of another attack.
-    edits = len(result.flips)
-    if edits > result.edit_budget or queries != result.queries or queries > result.query_budget:
+    change = result.change
+    if (change.edits > result.edit_budget or change.nodes > result.node_budget
+            or queries != result.queries or queries > result.query_budget):
         raise EvaluationError(
-            f'frame at {result.clean.stamp_ns} ns: {edits} edits of {result.edit_budget}, '
-            f'{queries} queries of {result.query_budget} ({result.queries} reported): the attack '
-            'does not keep to its budgets')
+            f'frame at {result.clean.stamp_ns} ns: {change.edits} edits of {result.edit_budget}, '
+            f'{change.nodes} nodes of {result.node_budget}, {queries} queries of '
+            f'{result.query_budget} ({result.queries} reported): the attack does not keep to its '
+            'budgets')

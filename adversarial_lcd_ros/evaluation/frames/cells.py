@@ -25,7 +25,7 @@ from adversarial_lcd_ros.lcd.targets import decision_path
 from adversarial_lcd_ros.registry import YARDSTICKS
 
 # Of the row's columns; a change in the code below runs cells again by itself.
-SCHEMA = 5
+SCHEMA = 6
 # What makes the figures of a row.
 _CODE = ('attack', 'lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled',
          'messages', 'evaluation/metrics', 'evaluation/frames/attacked',

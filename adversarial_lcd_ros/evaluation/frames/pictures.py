@@ -112,7 +112,9 @@ def _again(stream: Stream, cell: Cell, row: Row, frame: dict[str, Any],
     sample = sample_frames(stream.labels, cell.frames, row['seed'])
     results, = attack_frames(load_stream_graphs(stream.graphs), sample, [cell], lcd, row['seed'])
     found = next(result for result in results if result.result.clean.stamp_ns == frame['stamp'])
-    if (len(found.result.flips), found.result.queries) != (frame['edits'], frame['queries']):
+    change = found.result.change
+    if (change.edits, change.nodes, found.result.queries) != (
+            frame['edits'], frame['nodes_moved'], frame['queries']):
         _log.warning('%s: the frame at %d ns took %d queries and now takes %d; no picture of it',
                      row['sequence'], frame['stamp'], frame['queries'], found.result.queries)
         return None
@@ -126,13 +128,19 @@ def _picture(stream: Stream, row: Row, frame: dict[str, Any], found: FrameResult
     match = next(graph for graph in graphs if graph.stamp_ns == stamp)
     clean = found.result.clean
     caption = (f'Probability {found.clean.probability:.2f} clean, '
-               f'{found.attacked.probability:.2f} attacked; {frame["edits"]} edges flipped of '
-               f'{frame["edit_budget"]} allowed, {frame["queries"]} queries; target '
+               f'{found.attacked.probability:.2f} attacked; {_spent(frame)}, '
+               f'{frame["queries"]} queries; target '
                f'{row["target"]}.')
     return Picture(
         f'{row["sequence"]}, frame {clean.sequence}: {effect} by {wording.attack_title(row)}',
         caption, draw_attack(_image(stream, clean), clean, _image(stream, match), match,
                              found.result.perturbed))
+
+
+def _spent(frame: dict[str, Any]) -> str:
+    if frame['node_budget']:
+        return f'{frame["nodes_moved"]} nodes changed of {frame["node_budget"]} allowed'
+    return f'{frame["edits"]} edges flipped of {frame["edit_budget"]} allowed'
 
 
 def _image(stream: Stream, graph: MultiTierGraph) -> NDArray[np.uint8]:

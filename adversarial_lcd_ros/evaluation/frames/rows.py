@@ -25,10 +25,11 @@ ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
                      'duration_s', 'query_s', 'search_s', 'judge_s'), _NUMBER),
     **dict.fromkeys(('nodes_mean', 'edges_mean', 'accuracy_clean', 'accuracy_attacked',
                      'balanced_clean', 'balanced_attacked', 'decline_pp', 'edits_mean',
-                     'queries_mean', 'success_rate'), _FIGURE),
+                     'nodes_moved_mean', 'queries_mean', 'success_rate'), _FIGURE),
     'frame_results': (list,)}
 _FRAME_COLUMNS: Mapping[str, tuple[type, ...]] = {
-    **dict.fromkeys(('stamp', 'kind', 'edits', 'queries', 'edit_budget'), (int,)),
+    **dict.fromkeys(('stamp', 'kind', 'edits', 'queries', 'edit_budget', 'nodes_moved',
+                     'node_budget'), (int,)),
     **dict.fromkeys(('clean', 'attacked', 'status'), _TEXT)}
 
 
@@ -69,9 +70,10 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'invented_elsewhere': sum(
             result.attacked_is == ELSEWHERE and (was, now) == ('TN', 'FP')
             for result, was, now in zip(results, before, after, strict=True)),
-        'unattackable': sum(attack.edit_budget < 1 or attack.status == 'skipped'
-                            for attack in attacks),
-        'edits_mean': _mean([len(attack.flips) for attack in attacks]),
+        'unattackable': sum(attack.edit_budget + attack.node_budget < 1
+                            or attack.status == 'skipped' for attack in attacks),
+        'edits_mean': _mean([attack.change.edits for attack in attacks]),
+        'nodes_moved_mean': _mean([attack.change.nodes for attack in attacks]),
         'queries_mean': _mean([attack.queries for attack in attacks]),
         'success_rate': _mean(turned),
         'frame_results': [_frame(*entry) for entry in zip(results, before, after, strict=True)],
@@ -107,7 +109,8 @@ def _frame(result: FrameResult, before: str, after: str) -> dict[str, Any]:
     shown = sorted({round(place) for place in np.linspace(0, max(last, 0), _TRACE_POINTS)})
     return {'stamp': attack.clean.stamp_ns, 'kind': result.kind, 'clean': str(before),
             'attacked': str(after), 'attacked_is': result.attacked_is,
-            'edit_budget': attack.edit_budget, 'edits': len(attack.flips),
+            'edit_budget': attack.edit_budget, 'edits': attack.change.edits,
+            'node_budget': attack.node_budget, 'nodes_moved': attack.change.nodes,
             'queries': attack.queries, 'status': attack.status, 'reason': attack.reason,
             'loss_before': round(attack.loss_before, 4),
             'loss_after': round(attack.loss_after, 4),

@@ -65,12 +65,17 @@ def choose_records(run: Sequence[QueryRecord], count: int = 6) -> list[QueryReco
     return sorted(chosen, key=lambda record: record.frame)
 
 
+def _spent(record: QueryRecord) -> str:
+    if record.node_budget:
+        return f'{record.nodes_moved or 0} nodes changed of {record.node_budget}'
+    return f'{record.edits or 0} edges flipped of {record.edit_budget or 0}'
+
+
 def describe(record: QueryRecord, clean: QueryRecord) -> tuple[str, str]:
     """Return title and caption of the picture of an attacked frame."""
     what, text = ((record.effect, _EFFECTS[record.effect]) if record.effect
                   else _UNCHANGED if record.kind == NO_TRUTH else _OUTCOMES[record.outcome])
     title = f'Frame {record.frame}: {what}'
     caption = (f'{text} Probability {clean.probability:.2f} clean, {record.probability:.2f} '
-               f'attacked; {record.edits or 0} edges flipped of {record.edit_budget or 0} '
-               f'allowed, {record.queries or 0} queries.')
+               f'attacked; {_spent(record)} allowed, {record.queries or 0} queries.')
     return title, caption

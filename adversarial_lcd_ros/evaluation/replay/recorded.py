@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from adversarial_lcd_ros.attack.forging import change_between
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
@@ -139,8 +140,9 @@ def _by_stamp(path: Path, topic: str, decode: Callable[[bytes], MessageT]) -> di
 
 def _report(clean: MultiTierGraph, forwarded: MultiTierGraph) -> AttackReport:
     # What the two graphs say; the rest is not known.
+    change = change_between(clean, forwarded)
     return AttackReport(clean.stamp_ns, clean.frame_id, clean.sequence, 'failure',
-                        edits=len(clean.flips_to(forwarded)))
+                        edits=change.edits, nodes_moved=change.nodes)
 
 
 def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelConfig, *,
@@ -195,7 +197,8 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
     records = make_records(found, clean, {RECORDED: AttackRun(run.decisions, run.reports)})
     records = ask_check(records, {CLEAN: run.clean, RECORDED: run.forwarded}, lcd)
     if not heard.has_reports:
-        records = [replace(record, status=None, edit_budget=None, query_budget=None, queries=None,
+        records = [replace(record, status=None, edit_budget=None, node_budget=None,
+                           query_budget=None, queries=None,
                            loss_before=None, loss_after=None, duration_s=None, reason=None)
                    for record in records]
     summary = summarise(sequence.name, records, {RECORDED: None}, GraphStatistics.of(

@@ -72,6 +72,7 @@ class QueryRecord:
         What is said of the match: right, wrong, elsewhere (shares nothing, for certain), untold,
         or empty without one.
     status, reason, edit_budget, edits, query_budget, queries, loss_before, loss_after, duration_s
+    node_budget, nodes_moved
         The attacker's report; None in the clean run.
     support : float or None
         How far a geometric check bears the declared loop out, 1: it stands; None if none is
@@ -102,6 +103,8 @@ class QueryRecord:
     loss_after: float | None = None
     duration_s: float | None = None
     support: float | None = None
+    node_budget: int | None = None
+    nodes_moved: int | None = None
 
     @property
     def label(self) -> int:

@@ -20,6 +20,7 @@ import shutil
 import time
 from typing import Any
 
+from adversarial_lcd_ros.attack.forging import change_between
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
@@ -294,7 +295,12 @@ def _check(name: str, run: Recording, frames: int) -> None:
         raise EvaluationError(f'run {name}: {frames} frames, but ' + ', '.join(
             f'{count} {what}' for what, count in wrong.items()))
     for before, after, report in zip(run.clean, run.forwarded, run.reports, strict=False):
-        if len(before.flips_to(after)) > report.edit_budget:
+        change = change_between(before, after)
+        if change.nodes > report.node_budget:
+            raise EvaluationError(f'run {name}: graph {before.sequence} was changed in '
+                                  f'{change.nodes} nodes, over its budget of '
+                                  f'{report.node_budget}')
+        if change.edits > report.edit_budget:
             raise EvaluationError(f'run {name}: graph {before.sequence} was changed in more '
                                   f'edges than its budget of {report.edit_budget}')
 

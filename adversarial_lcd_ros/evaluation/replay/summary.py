@@ -250,6 +250,7 @@ def _effort(run: Sequence[QueryRecord]) -> dict[str, Any]:
     return {
         'edits_mean': _mean(_known(run, 'edits')),
         'edit_budget_mean': _mean(_known(run, 'edit_budget')),
+        'nodes_moved_mean': _mean(_known(run, 'nodes_moved')),
         'queries_mean': _mean(queries),
         'queries_mean_attacked': _mean(_known(attacked, 'queries')),
         'queries_total': None if queries is None else int(queries.sum()),
@@ -271,4 +272,4 @@ def _mean(values: NDArray[np.float64] | None) -> float | None:
 
 
 def _unattackable(record: QueryRecord) -> bool:
-    return record.status == 'skipped' or record.edit_budget == 0
+    return record.status == 'skipped' or (record.edit_budget == 0 and not record.node_budget)

@@ -1,0 +1,1 @@
+"""Attacks on pictures, before any graph is built: what somebody puts into the scene."""
