@@ -162,7 +162,7 @@ class BuilderConfig(Config):
         0.01, 'Detectors csv and topic: largest offset in time between a frame and its '
         'detections, seconds.', low=0.0, high=1e3)
     model: str = setting(
-        '', 'ONNX object model; empty: the one that "adversarial-lcd fetch-model" provisions.')
+        '', 'ONNX object model; empty: the one that ships.')
     vocabulary: str = setting('', 'Visual vocabulary (npz); empty: the one that ships.')
     object_score: float = setting(
         0.4, 'Least confidence of an object.', low=0.0, high=1.0)

@@ -100,5 +100,11 @@ def cache_folder() -> Path:
 
 
 def object_model_path() -> Path:
-    """Return where "adversarial-lcd fetch-model" puts the object model; it may not be there."""
+    """Return the object model that ships or, where none does, where it would be provisioned."""
+    shipped = _HERE / 'models' / OBJECT_MODEL
+    return shipped if shipped.is_file() else provisioned_model_path()
+
+
+def provisioned_model_path() -> Path:
+    """Return where "adversarial-lcd fetch-model" puts an object model; it may not be there."""
     return cache_folder() / 'models' / OBJECT_MODEL

@@ -28,7 +28,7 @@ from zipfile import ZipFile
 import yaml
 
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.paths import OBJECT_MODEL, object_model_path
+from adversarial_lcd_ros.paths import OBJECT_MODEL, object_model_path, provisioned_model_path
 
 MODEL_SHA256 = '4c762b2b52fda654ed5372f30bbb501891f647e1a782f8ccee88976e299f8a41'
 SOURCE = 'paddlelabel-ml==1.0.0'
@@ -84,7 +84,8 @@ def fetch_object_model(destination: Path | None = None,
     Parameters
     ----------
     destination : Path, optional
-        File to write; ``paths.object_model_path()`` if not given.
+        File to write. If not given: the model that ships, which is checked; with ``anew``, or
+        where none ships, ``paths.provisioned_model_path()``.
     progress : callable, optional
         Is told in a few words what is being done.
     anew : bool
@@ -97,7 +98,8 @@ def fetch_object_model(destination: Path | None = None,
         converter, or a checksum is wrong.
 
     """
-    path = object_model_path() if destination is None else Path(destination)
+    here = provisioned_model_path() if anew else object_model_path()
+    path = here if destination is None else Path(destination)
     tell = progress or (lambda _: None)
     if path.exists():
         _check_sha256(path, MODEL_SHA256, f'delete {path} and fetch it again')

@@ -11,7 +11,6 @@ import pytest
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
 from adversarial_lcd_ros.messages import codec
-from adversarial_lcd_ros.paths import object_model_path
 from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
 from adversarial_lcd_ros.vision.features import Features
 from adversarial_lcd_ros.vision.objects import Detections
@@ -175,15 +174,13 @@ def test_frames_begun_side_by_side_give_the_graphs_they_give_alone(builder):
 
 
 def test_a_builder_without_its_model_does_not_start(tmp_path):
-    with pytest.raises(ModelError, match='fetch-model'):
+    with pytest.raises(ModelError, match='the one that ships'):
         GraphBuilder(BuilderConfig(model=str(tmp_path / 'none.onnx')))
     with pytest.raises(ModelError, match='no vocabulary'):
         GraphBuilder(BuilderConfig(vocabulary=str(tmp_path / 'none.npz'), detector='none'))
 
 
 def test_a_real_frame_gives_objects_features_and_the_same_graph_again(shared_data):
-    if not object_model_path().is_file():
-        pytest.skip('the object model has not been fetched')
     image = cv2.imread(str(sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))[808]))
     with GraphBuilder() as builder:
         graph = builder.build(image, 1)

@@ -82,7 +82,7 @@ def test_without_a_home_the_variable_to_set_is_named(monkeypatch, capsys):
     monkeypatch.setattr(Path, 'home', no_home)
     with pytest.raises(ModelError, match='no home folder'):
         paths.cache_folder()
-    assert main(['fetch-model']) == 2
+    assert main(['fetch-model', '--anew']) == 2
     assert 'set ADVERSARIAL_LCD_CACHE' in capsys.readouterr().err
 
 

@@ -193,6 +193,12 @@ def test_the_detections_of_another_sequence_are_refused(tmp_path, config):
         open_graphs(str(tum), replace(config, detections=str(wrong)), tmp_path / 'cache')
 
 
+def test_detections_that_nobody_looks_at_are_refused(tmp_path, vocabulary):
+    with pytest.raises(ConfigError, match='set the detector to "csv"'):
+        GraphBuilder(BuilderConfig(detector='none', detections=str(tmp_path / 'found.csv'),
+                                   vocabulary=vocabulary))
+
+
 def test_a_detector_finds_loops_by_objects_alone(folder, config, lcd_model, tmp_path):
     graphs = open_graphs(str(folder), config, tmp_path / 'cache').graphs
     detector = LoopClosureDetector(LcdConfig(model=lcd_model, min_gap_s=0.0, map_window=0))

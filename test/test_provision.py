@@ -9,7 +9,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from adversarial_lcd_ros import provision
+from adversarial_lcd_ros import paths, provision
 from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.paths import object_model_path
 
@@ -156,8 +156,10 @@ def test_folder_that_cannot_be_written_is_named(registry, tmp_path):
         provision.fetch_object_model(tmp_path / 'file' / 'pico.onnx')
 
 
-def test_model_is_put_where_the_builder_looks(monkeypatch, tmp_path):
+def test_the_builder_looks_for_the_model_that_ships_first(monkeypatch, tmp_path):
     monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path))
+    assert provision.fetch_object_model() == object_model_path() == provision.SHIPPED
+    monkeypatch.setattr(paths, '_HERE', tmp_path)
     assert object_model_path() == tmp_path / 'models' / 'picodet_s_coco.onnx'
 
 

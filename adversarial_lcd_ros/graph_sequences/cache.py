@@ -82,8 +82,8 @@ def _bytes(path: Path) -> bytes:
     try:
         return read_bytes(path, MAX_NETWORK_BYTES)
     except FileError as error:
-        raise ModelError(f'{error}; "adversarial-lcd fetch-model" provides the default object '
-                         'model, "adversarial-lcd train" a vocabulary') from error
+        raise ModelError(f'{error}; leave the settings "model" and "vocabulary" empty for '
+                         'those that ship') from error
 
 
 def save_graphs(path: Path, graphs: Several[MultiTierGraph]) -> None:

@@ -89,7 +89,7 @@ class GraphBuilder:
         if self.config.detector == 'onnx':
             model = Path(self.config.model) if self.config.model else object_model_path()
             self._objects = ObjectDetector(model, self.config.object_score, self.config.threads)
-        self._table = _recorded(self.config) if self.config.detector == 'csv' else None
+        self._table = _recorded(self.config)
         self._threads = ThreadPoolExecutor(frames_at_once, 'objects')
 
     def build(self, image: NDArray[np.uint8], stamp_ns: int, frame_id: str = 'camera',
@@ -194,7 +194,13 @@ class GraphBuilder:
         self.close()
 
 
-def _recorded(config: BuilderConfig) -> DetectionTable:
+def _recorded(config: BuilderConfig) -> DetectionTable | None:
+    if config.detector != 'csv':
+        if config.detections:
+            raise ConfigError(f'detections {config.detections} are named, but the detector is '
+                              f'"{config.detector}", which does not look at them: set the '
+                              'detector to "csv"')
+        return None
     if not config.detections:
         raise ConfigError('detector "csv" without a file: name it by the setting "detections"')
     return read_detections(Path(config.detections))

@@ -134,13 +134,13 @@ class ObjectDetector:
         self._model = model
         self._score = score
         if not model.is_file():
-            raise ModelError(f'no object model at {model}: run "adversarial-lcd fetch-model", or '
-                             'name one by the setting "model", or set "detector" to "none"')
+            raise ModelError(f'no object model at {model}: leave the setting "model" empty for '
+                             'the one that ships, or set "detector" to "none"')
         try:
             self._session = open_network(model, threads)
         except FileError as error:
-            raise ModelError(f'{error}; "adversarial-lcd fetch-model" provides the default model'
-                             ) from error
+            raise ModelError(f'{error}; leave the setting "model" empty for the one that '
+                             'ships') from error
         self._run = self._recognise()
         # A model that cannot run says so now, and the first frame finds it warm.
         with bounded_memory(NETWORK_ROOM_BYTES):
