@@ -11,6 +11,7 @@ from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from builtin_interfaces.msg import Time
+from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
@@ -51,7 +52,8 @@ def red(message):
 @pytest.fixture
 def world(ros):
     node = ros.start(ViewerNode)
-    views = ros.collect('view/compressed', lambda message: message, CompressedImage, raw=False)
+    views = ros.collect('view/compressed', lambda message: message, CompressedImage, raw=False,
+                        reliability=ReliabilityPolicy.BEST_EFFORT)
     publishers = {name: ros.publisher(name) for name in NAMES}
     publishers['frame'] = ros.publisher('image/compressed', CompressedImage)
     for publisher in publishers.values():
