@@ -39,7 +39,8 @@ def said(number):
         codec.encode_graph(clean), codec.encode_graph(forwarded),
         codec.encode_loop_closure(LoopClosure(stamp, 'camera', number, bool(number), number / 2,
                                               **match)),
-        codec.encode_attack_report(AttackReport(stamp, 'camera', number, 'success', edits=2)))
+        codec.encode_attack_report(AttackReport(stamp, 'camera', number, 'success',
+                                               edit_budget=3, edits=2)))
     yield from zip(NAMES, map(wrap, payloads), strict=True)
 
 

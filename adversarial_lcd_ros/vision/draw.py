@@ -166,7 +166,8 @@ def draw_decision(query: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayL
     """
     blank = np.full((_PANEL_HEIGHT, _PANEL_WIDTH, 3), _PAPER, np.uint8)
     panels = [('frame, with the graph that the detector got', _panel(query, graph, flips)),
-              ('best matching keyframe', blank if match is None else _panel(match, None))]
+              ('best matching keyframe: no picture of it', blank) if match is None else
+              ('best matching keyframe', _panel(match, None))]
     return _side_by_side(panels, [(verdict, _OBJECT if is_loop else _INK), (why, _INK)])
 
 
