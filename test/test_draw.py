@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import GraphError
-from adversarial_lcd_ros.vision.draw import draw_attack, draw_graph
+from adversarial_lcd_ros.vision.draw import draw_attack, draw_decision, draw_graph
 
 FRAME = np.full((480, 640, 3), 128, np.uint8)
 PLACES = np.array([(320, 100), (100, 300), (540, 300), (300, 440), (40, 40), (600, 60)],
@@ -102,3 +102,21 @@ def test_moved_nodes_are_shown_with_where_they_came_from():
     red = (picture[..., 2] > 180) & (picture[..., :2].max(axis=2) < 110)
     assert red[:, third + 440:].any()
     assert not red[:, :third].any()
+
+
+@pytest.mark.parametrize('is_loop', [True, False])
+def test_a_decision_shows_the_match_beside_and_the_verdict_below(is_loop):
+    match = np.full((480, 640, 3), 200, np.uint8)
+    shown = draw_decision(FRAME, None, scene(), match, 'verdict', 'why', is_loop=is_loop)
+    assert shown.shape == (450, 958, 3)
+    assert (shown[200, 700] == 200).all()
+    alone = draw_decision(FRAME, None, scene(), None, '', '', is_loop=is_loop)
+    assert (alone[200, 700] < 40).all()
+    position = scene().position.copy()
+    position[4] = 600, 20
+    moved = draw_decision(FRAME, scene(), replace(scene(), position=position), match, '', '',
+                          is_loop=is_loop)
+    red = (moved[30:390, :476, 2] > 180) & (moved[30:390, :476, :2].max(axis=2) < 110)
+    assert red.any()
+    coloured = np.ptp(shown[390:420].astype(int), axis=2).max()
+    assert (coloured > 100) == is_loop

@@ -11,6 +11,7 @@ from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 pytest.importorskip('rclpy', reason='rclpy is not installed')
 
 from builtin_interfaces.msg import Time
+from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
@@ -38,7 +39,8 @@ def said(number):
         codec.encode_graph(clean), codec.encode_graph(forwarded),
         codec.encode_loop_closure(LoopClosure(stamp, 'camera', number, bool(number), number / 2,
                                               **match)),
-        codec.encode_attack_report(AttackReport(stamp, 'camera', number, 'success', edits=2)))
+        codec.encode_attack_report(AttackReport(stamp, 'camera', number, 'success',
+                                               edit_budget=3, edits=2)))
     yield from zip(NAMES, map(wrap, payloads), strict=True)
 
 
@@ -51,7 +53,8 @@ def red(message):
 @pytest.fixture
 def world(ros):
     node = ros.start(ViewerNode)
-    views = ros.collect('view/compressed', lambda message: message, CompressedImage, raw=False)
+    views = ros.collect('view/compressed', lambda message: message, CompressedImage, raw=False,
+                        reliability=ReliabilityPolicy.BEST_EFFORT)
     publishers = {name: ros.publisher(name) for name in NAMES}
     publishers['frame'] = ros.publisher('image/compressed', CompressedImage)
     for publisher in publishers.values():

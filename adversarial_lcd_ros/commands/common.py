@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 TABLE_WIDTH = 150
 _LEAST_NAME = 12
-Commands: TypeAlias = '_SubParsersAction[ArgumentParser]'
+Commands: TypeAlias = '_SubParsersAction[Any]'
 
 
 def add_command(commands: Commands, name: str, help: str,

@@ -80,8 +80,10 @@ def _interval(method: Summary, cells: Sequence[Summary]) -> Sequence[float] | No
 
 
 def _effort(attack: Mapping[str, Any], title: str) -> dict[str, str]:
-    return {'attack': title, 'whose': whose(attack),
-            'edits': wording.mean_count(attack['edits_mean']),
+    moved = attack.get('nodes_moved_mean')
+    edits = f'{wording.mean_count(moved)} nodes' if moved else wording.mean_count(
+        attack['edits_mean'])
+    return {'attack': title, 'whose': whose(attack), 'edits': edits,
             'queries': wording.mean_count(attack['queries_mean'])}
 
 

@@ -125,16 +125,12 @@ def draw_attack(query: NDArray[np.uint8], clean: MultiTierGraph, match: NDArray[
         An image and its graph differ in size.
 
     """
-    same = clean.node_digest == perturbed.node_digest
-    flips = clean.flips_to(perturbed) if same else None
-    moves = None if same or clean.node_count != perturbed.node_count else np.stack(
-        [clean.position, perturbed.position], axis=1)
     panels = [('query', _panel(query, clean)), ('match', _panel(match, match_graph)),
-              ('attacked graph', _panel(query, perturbed, flips, moves))]
+              ('attacked graph', _changed_panel(query, clean, perturbed))]
     return _side_by_side(panels, [(caption, _INK)] if caption else [])
 
 
-def draw_decision(query: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayLike | None,
+def draw_decision(query: NDArray[np.uint8], clean: MultiTierGraph | None, graph: MultiTierGraph,
                   match: NDArray[np.uint8] | None, verdict: str, why: str, *,
                   is_loop: bool) -> NDArray[np.uint8]:
     """
@@ -143,10 +139,10 @@ def draw_decision(query: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayL
     Parameters
     ----------
     query : uint8, (h, w, 3) BGR or (h, w) grey
+    clean : MultiTierGraph or None
+        The graph as built: what an attacker has changed is drawn red; None where nobody knows.
     graph : MultiTierGraph
         As the detector got it.
-    flips : int, (k, 2), or None
-        Pairs that an attacker has flipped, drawn red; None where nobody knows.
     match : uint8, (h, w, 3) BGR or (h, w) grey, or None
         None where there was no candidate, or its picture is not at hand.
     verdict, why : str
@@ -161,13 +157,26 @@ def draw_decision(query: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayL
     Raises
     ------
     GraphError
-        Image and graph differ in size, or a flip names a node that the graph has not.
+        Image and graph differ in size.
 
     """
     blank = np.full((_PANEL_HEIGHT, _PANEL_WIDTH, 3), _PAPER, np.uint8)
-    panels = [('frame, with the graph that the detector got', _panel(query, graph, flips)),
-              ('best matching keyframe', blank if match is None else _panel(match, None))]
+    panels = [('frame, with the graph that the detector got', _changed_panel(query, clean, graph)),
+              ('best matching keyframe: no picture of it', blank) if match is None else
+              ('best matching keyframe', _panel(match, None))]
     return _side_by_side(panels, [(verdict, _OBJECT if is_loop else _INK), (why, _INK)])
+
+
+def _changed_panel(image: NDArray[np.uint8], clean: MultiTierGraph | None,
+                   graph: MultiTierGraph) -> NDArray[np.uint8]:
+    """Return a panel with a graph, and what it has other than the clean one in red."""
+    if clean is None:
+        return _panel(image, graph)
+    same = clean.node_digest == graph.node_digest
+    flips = clean.flips_to(graph) if same else None
+    moves = None if same or clean.node_count != graph.node_count else np.stack(
+        [clean.position, graph.position], axis=1)
+    return _panel(image, graph, flips, moves)
 
 
 def _side_by_side(panels: Sequence[tuple[str, NDArray[np.uint8]]],

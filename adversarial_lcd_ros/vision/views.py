@@ -85,12 +85,9 @@ class Views:
         query = self._picture(stamp_ns)
         assert query is not None
         try:
-            known = clean is not None and clean.node_digest == graph.node_digest
-            flips = clean.flips_to(graph) if clean is not None and known else None
             drawn = draw_decision(
-                query, graph, flips, self._picture(decision.match_stamp_ns), verdict(decision),
-                why(decision, clean, graph, report),
-                is_loop=decision.is_loop)
+                query, clean, graph, self._picture(decision.match_stamp_ns), verdict(decision),
+                why(decision, clean, graph, report), is_loop=decision.is_loop)
         except GraphError:  # of images of another size
             return None
         return Frame.of_pixels(stamp_ns, drawn).compressed(JPEG)
