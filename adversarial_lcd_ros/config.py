@@ -74,6 +74,11 @@ class Config:
                               f'{cls.__name__}; there are: {", ".join(known)}')
         return cls(**{name: _widen(known[name], value) for name, value in values.items()})
 
+    def changed(self, *but: str) -> str:
+        """Return the settings that are not the default in words, some left out; '' if none."""
+        return ', '.join(f'{entry.name} {getattr(self, entry.name)}' for entry in fields(self)
+                         if entry.name not in but and getattr(self, entry.name) != entry.default)
+
 
 def _widen(entry: Field[Any], value: Any) -> Any:
     # A whole number is a fine value for a real setting (YAML "1", command line "1").
