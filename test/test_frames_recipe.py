@@ -103,7 +103,7 @@ attacks: [{search: recall}]
     assert (desk.rule, desk.min_gap_s) == ('overlap', 4.0)
     assert list(load_labels('paper', {})) == ['rgbd_dataset_freiburg3_long_office_household']
     for labels in ('[desk]', '{desk: overlap}', '{desk: {rule: guess}}'):
-        with pytest.raises(ConfigError, match='mine.yaml'):
+        with pytest.raises(ConfigError, match=r'mine\.yaml'):
             load_labels(written(tmp_path, f"""
 protocol: frames
 labels: {labels}
