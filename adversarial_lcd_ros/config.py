@@ -319,7 +319,7 @@ class ReplayConfig(Config):
 
 @dataclass(frozen=True)
 class LabelConfig(Config):
-    """Which pairs of frames are a loop, from ground truth only (docs/evaluation.md)."""
+    """Which pairs of frames are a loop, from ground truth only (docs/labels.md)."""
 
     title: ClassVar[str] = 'labels'
 
