@@ -154,7 +154,7 @@ def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
     recall = next(cell for cell in cells if cell['sequence'] == SEQUENCES[0]
                   and (cell['target'], cell['method']) == ('wl', 'recall'))
     fields = lines[3].split(' | ')
-    assert fields[1] == '200'
+    assert fields[1] == '200 (100 different)'
     assert fields[5].startswith(f'{recall["decline_pp"]:.1f} (')
     assert lines[7].endswith('allows an edit: synthetic_desk.')
     assert lines[9].startswith('| `anchored` |')
