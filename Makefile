@@ -12,7 +12,7 @@
 PYTHON ?= python3
 ARGS ?=
 DATA ?= ../shared/data
-PAPER ?= flat_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy \
+PAPER ?= flat_tour office_tour bookstore_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy \
   rgbd_dataset_freiburg3_long_office_household
 MODELS ?= adversarial_lcd_ros/models
 TRAIN ?= flat_train

@@ -75,6 +75,11 @@ class Config:
                               f'{cls.__name__}; there are: {", ".join(known)}')
         return cls(**{name: _widen(known[name], value) for name, value in values.items()})
 
+    def changed(self, *but: str) -> str:
+        """Return the settings that are not the default in words, some left out; '' if none."""
+        return ', '.join(f'{entry.name} {getattr(self, entry.name)}' for entry in fields(self)
+                         if entry.name not in but and getattr(self, entry.name) != entry.default)
+
 
 def _widen(entry: Field[Any], value: Any) -> Any:
     # A whole number is a fine value for a real setting (YAML "1", command line "1").
@@ -328,7 +333,7 @@ class ReplayConfig(Config):
 
 @dataclass(frozen=True)
 class LabelConfig(Config):
-    """Which pairs of frames are a loop, from ground truth only (docs/evaluation.md)."""
+    """Which pairs of frames are a loop, from ground truth only (docs/labels.md)."""
 
     title: ClassVar[str] = 'labels'
 

@@ -59,6 +59,7 @@ def targets_folder(path, *, accuracy=0.75, lcd=None, labels=None):
            'precision': 0.9, 'recall': 0.8}
     rows = [{**row, 'protocol': 'pairs', 'n_pairs': 18, 'distinct_pairs': 17, 'seeds': 1},
             {**row, 'protocol': 'live', 'n_frames': 60, 'wrong_matches': 1,
+             'declared_elsewhere': 2, 'untold_matches': 3,
              'latency_to_first_closure_s': 2.0}]
     made.write_json(results.SUMMARY, results.summary_document(
         targets.KIND, targets.SCHEMA, rows))

@@ -63,6 +63,8 @@ def test_kinds_of_frames_by_shares():
     assert labels.names == ['no_candidate', 'no_candidate', 'negative', 'positive', 'scale',
                             'between']
     assert labels.is_correct([3, 4, 4, 5], [0, 1, 0, 0]).tolist() == [True, True, False, False]
+    assert labels.judge([3, 4, 4, 5, 5], [0, 1, 0, 0, -1]).tolist() == [
+        'right', 'right', 'elsewhere', 'untold', '']
     assert labels.elsewhere[4, 0]
     assert not labels.elsewhere[5, 0]  # cannot be told
 

@@ -3,7 +3,7 @@
 import pytest
 
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.frames.recipe import load_cells, load_labels
 from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 
 
@@ -91,3 +91,21 @@ def test_a_wrong_recipe_is_refused(tmp_path, text, said):
 def test_a_recipe_of_frames_does_not_replay():
     with pytest.raises(ConfigError, match='protocol is "live"'):
         load_recipe('paper', {})
+
+
+def test_sequences_may_have_labels_of_their_own(tmp_path):
+    recipe = written(tmp_path, """
+protocol: frames
+labels: {desk: {rule: overlap, min_gap_s: 3}}
+attacks: [{search: recall}]
+""")
+    desk = load_labels(recipe, {'min_gap_s': 4.0})['desk']
+    assert (desk.rule, desk.min_gap_s) == ('overlap', 4.0)
+    assert list(load_labels('paper', {})) == ['rgbd_dataset_freiburg3_long_office_household']
+    for labels in ('[desk]', '{desk: overlap}', '{desk: {rule: guess}}'):
+        with pytest.raises(ConfigError, match=r'mine\.yaml'):
+            load_labels(written(tmp_path, f"""
+protocol: frames
+labels: {labels}
+attacks: [{{search: recall}}]
+"""), {})

@@ -45,6 +45,7 @@ def test_counts_path_and_pairs_are_written(sequence, tmp_path, monkeypatch):
     assert 'co-visibility' in page
     assert page.count('data:image/jpeg') == len(list(out.glob('*_*_*.jpg'))) == 10
     assert (out / 'positive_12_0.jpg').is_file()
+    assert cv2.imread(str(out / 'labels.png')).shape[1] > 900
     (out / 'report.html').unlink()
     assert main(['report', str(out)]) == main(['inspect', str(out)]) == 0
     assert (out / 'report.html').read_text() == page

@@ -127,5 +127,22 @@ def test_latency_to_the_first_closure():
     assert first_closure_latency_s(stamp, kind, np.array(['TN', 'FN', 'WM', 'FN'])) is None
 
 
+def test_a_match_of_which_nobody_knows_takes_its_frame_out():
+    kind = np.array([1, 1, 1, -1], np.int8)
+    is_loop, correct = np.array([1, 1, 0, 0], bool), np.array([1, 0, 0, 0], bool)
+    told = np.array([1, 0, 0, 1], bool)
+    probability = np.array([.9, .8, .3, .1])
+    assert outcomes(kind, is_loop, correct, told).tolist() == ['TP', 'UM', 'FN', 'TN']
+    found = measure(kind, is_loop, probability, correct, told)
+    assert (found.positives, found.tp, found.fn, found.untold_matches) == (3, 1, 1, 1)
+    assert (found.precision, found.recall, found.wrong_matches) == (1, 0.5, 0)
+    # At the lowest threshold one loop is found, and of two others nobody knows.
+    assert found.curve.recall.tolist() == [1.0, pytest.approx(1 / 3)]
+    before, after = np.array(['TP', 'TP', 'TN']), np.array(['FN', 'UM', 'TN'])
+    change = effect(np.array([1, 1, -1], np.int8), before, after)
+    assert (change.suppressed, change.diverted, change.left_out) == (1, 0, 1)
+    assert change.decline_pp == 50
+
+
 def test_right_outcomes():
     assert right(np.array(['TP', 'TN', 'FN', 'WM', 'FP', ''])).tolist() == [True] * 2 + [False] * 4

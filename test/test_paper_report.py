@@ -13,6 +13,7 @@ from paper_factory import SEQUENCES, make_row, make_rows
 import pytest
 
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import latex_escape, latex_table
@@ -153,7 +154,7 @@ def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
     recall = next(cell for cell in cells if cell['sequence'] == SEQUENCES[0]
                   and (cell['target'], cell['method']) == ('wl', 'recall'))
     fields = lines[3].split(' | ')
-    assert fields[1] == '200'
+    assert fields[1] == '200 (100 different)'
     assert fields[5].startswith(f'{recall["decline_pp"]:.1f} (')
     assert lines[7].endswith('allows an edit: synthetic_desk.')
     assert lines[9].startswith('| `anchored` |')
@@ -336,3 +337,16 @@ def test_latex_compiles(whole, tmp_path):
     done = subprocess.run(['pdflatex', '-interaction=nonstopmode', '-halt-on-error', 'page.tex'],
                           cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout[-2000:]
+
+
+def test_a_sequence_without_new_places_reports_what_was_suppressed(tmp_path):
+    rows = [make_row(positives=60, power=0.5, seed=seed) for seed in (1, 2)]
+    cell, = summarise_cells(rows)
+    assert cell['decline_pp'] is None
+    write_paper_report(tmp_path, rows)
+    told = f'{wording.mean_count(cell["suppressed"])} of {wording.mean_count(cell["found_clean"])}'
+    assert f'| {told} | - |' in (tmp_path / 'tables.md').read_text()
+    page = (tmp_path / 'report.html').read_text()
+    assert f'<td data-name="suppressed">{told}</td>' in page
+    assert f'suppressed {told} loops found on synthetic_tour' in verdicts.headline(
+        [], 3e-4, [cell])

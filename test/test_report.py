@@ -103,6 +103,27 @@ def test_records_hold_outcome_and_effect(records):
     assert clean[3].match_frame is None
 
 
+def test_an_untold_match_is_in_no_figure_and_is_said():
+    labels = make_labels()
+    possible = labels.possible.copy()
+    possible[45, 15] = False  # neither right nor wrong
+    records = make_records(replace(labels, possible=possible), decide(range(30, 60)), make_runs())
+    clean, eigen = (runs_of(records)[name] for name in ('clean', 'eigen'))
+    assert (clean[45].outcome, clean[45].match_is) == ('UM', 'untold')
+    assert (eigen[40].match_is, eigen[45].effect) == ('elsewhere', '')
+    found = summarise('walks', records, ATTACKS, GraphStatistics.of([1] * COUNT, [1] * COUNT), 1,
+                      told_by='audit')
+    attack = found['attacks'][0]
+    assert found['clean']['untold_matches'] == attack['left_out'] == 1
+    assert found['clean']['recall'] == found['clean']['precision'] == 1
+    assert found['clean']['wrong_closures_unscored'] == 0
+    assert (attack['invented_elsewhere'], attack['diverted_elsewhere']) == (1, 1)
+    assert attack['declared_elsewhere'] == 2
+    assert attack['decline_pp'] == pytest.approx(50 * (6 / 29 + 1 / 22))
+    assert found['told_by'] == 'audit'
+    assert '1 frame was left out' in wording.headline(found)
+
+
 def test_records_survive_the_file(records, tmp_path):
     path = tmp_path / 'per_query.csv'
     write_records(path, records)

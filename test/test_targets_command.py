@@ -51,7 +51,11 @@ def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
     assert pairs['average_precision'] == pytest.approx(1)
     low, high = pairs['ci95']
     assert 0 <= low <= pairs['balanced_accuracy'] <= high <= 1
-    assert '| walk | 20 | `edges` | 20 (10 loops) |' in capsys.readouterr().out
+    line = capsys.readouterr().out.splitlines()[2]
+    assert line.startswith('| walk, min_gap_s 0.1, map_window 0, detected_features 60, detector '
+                           'none; labels by poses alone (rule distance, min_gap_s 0.1) | 20 |')
+    # Few pairs, drawn twice, do not look like many.
+    assert f'| 20 (10 loops), {pairs["distinct_pairs"]} different |' in line
 
 
 def test_rows_that_are_there_are_not_made_again(tmp_path, command, capsys):
@@ -78,7 +82,7 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['geometric_check'] for row in rows] == [True, True]
     assert [row['recall'] for row in rows] == [0, 0]
-    assert '| walk, geometric check |' in capsys.readouterr().out
+    assert '| walk, geometric check, ' in capsys.readouterr().out
 
 
 def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
@@ -86,7 +90,7 @@ def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['defences'] for row in rows] == ['own_defences:IgnoresEdges'] * 2
     assert [row['recall'] for row in rows] == [0, 0]
-    assert '| walk, own_defences:IgnoresEdges |' in capsys.readouterr().out
+    assert '| walk, own_defences:IgnoresEdges, ' in capsys.readouterr().out
 
 
 def test_live_and_pairs_see_the_threshold(tmp_path, command):
@@ -122,7 +126,7 @@ def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
 
 def test_the_recipe_that_ships_is_one(tmp_path):
     sequences = recipe_sequences('target', tmp_path, NOTHING)
-    assert len({sequence.source for sequence in sequences}) == len(sequences) == 5
+    assert len({sequence.source for sequence in sequences}) == len(sequences) == 7
 
 
 SHIPPED = model_path('target_wl.json')

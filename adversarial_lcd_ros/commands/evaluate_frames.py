@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 import os
 from pathlib import Path
 import sys
@@ -72,8 +72,10 @@ def run(options: Namespace) -> None:
 
     started = time.monotonic()
     _check(options)
-    cells = load_cells(options.recipe, _overrides(options))
     lcd = config_from_options(options, LcdConfig)
+    conditions = _conditions(options, lcd)
+    cells = [replace(cell, conditions=conditions)
+             for cell in load_cells(options.recipe, _overrides(options))]
     folder = _folder(options)
     with open_store(folder) as store:
         streams = _open(options, sorted({cell.nodes for cell in cells}))
@@ -128,18 +130,29 @@ def _overrides(options: Namespace) -> dict[str, Any]:
     return values
 
 
+def _conditions(options: Namespace, lcd: LcdConfig) -> str:
+    """Return settings that no column of the tables has and that are not the default."""
+    return ', '.join(filter(None, (
+        lcd.changed('target', 'threshold', 'hard_answers', 'model'),
+        config_from_options(options, BuilderConfig).changed(
+            'features', 'model', 'vocabulary', 'detections'),
+        config_from_options(options, LabelConfig).changed())))
+
+
 def _folder(options: Namespace) -> Path:
     output: Path = options.output
     return output / Path(options.recipe).stem if output == Path('results') else output
 
 
 def _open(options: Namespace, nodes: list[int]) -> list[Stream]:
+    from adversarial_lcd_ros.evaluation.frames.recipe import load_labels
     from adversarial_lcd_ros.evaluation.streams import open_streams
 
     with progress_bar('graphs') as progress:
         return open_streams(options.sources, nodes, config_from_options(options, BuilderConfig),
                             config_from_options(options, LabelConfig), options.cache,
-                            lambda source, done, total: progress(done, total))
+                            lambda source, done, total: progress(done, total),
+                            load_labels(options.recipe, chosen_settings(options, LabelConfig)))
 
 
 def _write_setup(folder: Path, options: Namespace, streams: list[Stream],

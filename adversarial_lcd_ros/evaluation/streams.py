@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 import hashlib
@@ -74,7 +74,8 @@ class Stream:
 
 def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,
                  config: LabelConfig, cache: Path | None,
-                 progress: Callable[[str, int, int], None]) -> list[Stream]:
+                 progress: Callable[[str, int, int], None],
+                 own_labels: Mapping[str, LabelConfig] | None = None) -> list[Stream]:
     """
     Open, and where needed build, the graphs of every sequence and size; label the frames.
 
@@ -92,6 +93,8 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
         Folder of built graphs; None: the user's.
     progress : callable
         Called with the source, frames done and frames in all.
+    own_labels : mapping, optional
+        Settings of labels in place of ``config``, by name of the sequence.
 
     Raises
     ------
@@ -112,7 +115,8 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
                 raise EvaluationError(f'two sequences are called {sequence.name}: rename one of '
                                       'the folders, or leave one out')
             # Stamps are the same in graphs of any size.
-            labels = label_sequence(sequence, config) if labels is None else labels
+            labels = labels or label_sequence(
+                sequence, (own_labels or {}).get(sequence.name, config))
             digest = graphs_digest(sequence.graphs)
             counts = [graph.node_count for graph in sequence.graphs]
             streams.append(Stream(sequence.name, size, sum(counts) / len(counts),

@@ -231,8 +231,9 @@ def _certain(attack: Attack) -> str:
     if attack['invented_elsewhere'] != attack['invented']:
         text = f' ({attack["invented_elsewhere"]} of them certainly elsewhere)'
     if attack['left_out']:
-        text += (f'; {attack["left_out"]} frames were left out, because nobody can tell whether '
-                 'their match is right')
+        were = 'frame was' if attack['left_out'] == 1 else 'frames were'
+        text += (f'; {attack["left_out"]} {were} left out, because nobody can tell whether '
+                 'the match is right')
     return text
 
 

@@ -1,4 +1,4 @@
-"""Labels of a sequence by the best evidence that there is (docs/evaluation.md)."""
+"""Labels of a sequence by the best evidence that there is (docs/labels.md)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """
-Which frames and pairs of frames are loops, from ground truth only (docs/evaluation.md).
+Which frames and pairs of frames are loops, from ground truth only (docs/labels.md).
 
 Two questions are kept apart. A *pair* of frames shows the same place, different places, or
 something between (``relation``, for the pair protocol). A *frame* of a replay has a loop to be

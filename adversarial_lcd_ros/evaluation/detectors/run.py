@@ -141,9 +141,9 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     Return the key of a task and its row.
 
     The row has ``sequence, target, protocol, nodes, nodes_mean, frames, scored, trained_on,
-    references_trained_on, geometric_check, defences, labels, told_by, positives,
-    negatives, balanced_accuracy, ci95, average_precision, recall_at_100_precision, mcc, precision,
-    recall``, and ``n_pairs, distinct_pairs, seeds`` or ``n_frames, wrong_matches,
+    references_trained_on, geometric_check, defences, changed, labels, labels_changed, told_by,
+    positives, negatives, balanced_accuracy, ci95, average_precision, recall_at_100_precision,
+    mcc, precision, recall``, and ``n_pairs, distinct_pairs, seeds`` or ``n_frames, wrong_matches,
     untold_matches, declared_elsewhere, latency_to_first_closure_s``; labels are settings.
     Undefined figures are None, so all of a sequence without pairs of a class.
     """
@@ -157,6 +157,10 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
         'references_trained_on': trained_on(task.model, stream.graphs.source,
                                             (0.0, task.scored[1])),
         'geometric_check': task.lcd.geometric_check, 'defences': task.lcd.defences,
+        'changed': ', '.join(filter(None, (
+            task.lcd.changed('target', 'model', 'geometric_check', 'defences'),
+            stream.graphs.builder.changed('features', 'model', 'vocabulary', 'detections')))),
+        'labels_changed': task.label_config.changed(),
         'labels': asdict(task.label_config), 'told_by': stream.labels.told_by, **figures}
 
 

@@ -47,6 +47,11 @@ def _group_lines(group: Sequence[Row]) -> list[str]:
             name += ', geometric check'
         if row.get('defences', NONE) != NONE:
             name += f', {row["defences"]}'
+        if row.get('changed'):
+            name += f', {row["changed"]}'
+        if row.get('told_by'):
+            own = f' ({row["labels_changed"]})' if row.get('labels_changed') else ''
+            name += f'; labels by {row["told_by"]}{own}'
         if row['trained_on']:
             name += ' (seen in training)'
         elif row['references_trained_on']:
@@ -74,7 +79,7 @@ def _cells(row: Row) -> list[str]:
 
 def _pairs(row: Row) -> str:
     text = f'{row["n_pairs"]} ({row["positives"] or 0} loops)'
-    different = row['distinct_pairs']
+    different = row.get('distinct_pairs', row['n_pairs'])
     return text if different == row['n_pairs'] else f'{text}, {different} different'
 
 

@@ -10,7 +10,7 @@ is a setting of a cell, like the size of the graph: declines hang on it more tha
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 import json
 from pathlib import Path
 from typing import Any
@@ -64,6 +64,8 @@ class Cell:
         For tables; may be empty.
     threshold : float
         Of the detectors: probability from which on a loop is declared.
+    conditions : str
+        Other settings of detector, graphs and labels that are not the default, in words.
 
     """
 
@@ -77,6 +79,7 @@ class Cell:
     seeds: int
     name: str = ''
     threshold: float = LcdConfig.threshold
+    conditions: str = ''
 
     @property
     def method(self) -> str:
@@ -91,11 +94,9 @@ class Cell:
 
     @property
     def variant(self) -> str:
-        """Settings of the attack without a column of their own that are not the usual ones."""
-        values = asdict(self.attack)
-        return ', '.join(f'{entry.name} {values[entry.name]}' for entry in fields(AttackConfig)
-                         if entry.name not in _COLUMNS + _FILES
-                         and values[entry.name] != entry.default)
+        """Settings without a column of their own that are not the usual ones."""
+        own = self.attack.changed(*_COLUMNS, *_FILES)
+        return ', '.join(filter(None, (own, self.conditions)))
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
     Config,
+    LabelConfig,
     LcdConfig,
     setting,
 )
@@ -39,7 +40,7 @@ _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry
 # Without their seeds; the paper's experiments have some hundred.
 MAX_CELLS = 10_000
 MAX_RUNS = 1_000_000
-_TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
+_TOP = ('protocol', 'seeds', 'frames', 'defaults', 'labels', 'attacks')
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,35 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
         raise ConfigError(f'recipe {path}: {len(cells)} attacks with their seeds are {runs} '
                           f'cells on each sequence; expected at most {MAX_RUNS}')
     return list(cells.values())
+
+
+def load_labels(name: str, chosen: Mapping[str, Any]) -> dict[str, LabelConfig]:
+    """
+    Return the labels of the sequences that need settings of their own, by name.
+
+    Parameters
+    ----------
+    name : str
+        As for ``load_cells``.
+    chosen : mapping
+        Settings of labels that win over those of the recipe.
+
+    Raises
+    ------
+    ConfigError
+        See ``load_cells``.
+
+    """
+    path, content = read_recipe(name)
+    labels = content.get('labels') or {}
+    if not isinstance(labels, dict) or not all(isinstance(own, dict) for own in labels.values()):
+        raise ConfigError(f'recipe {path}, labels: expected SEQUENCE: {{NAME: VALUE}}, found '
+                          f'{labels!r}')
+    try:
+        return {str(sequence): LabelConfig.from_mapping({**own, **chosen})
+                for sequence, own in labels.items()}
+    except ConfigError as error:
+        raise ConfigError(f'recipe {path}: {error}') from error
 
 
 def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:

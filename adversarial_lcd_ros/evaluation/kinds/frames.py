@@ -36,7 +36,7 @@ class FramesResults(ResultsKind):
     columns = {'sequence': str, 'target': str, 'perturbation': str, 'surrogate': str, 'mode': str,
                'ratio': MEASURED, 'threshold': MEASURED, 'seeds': int, 'ci95': INTERVAL,
                **dict.fromkeys(('balanced_clean', 'balanced_attacked', 'decline_pp', 'edits_mean',
-                                'queries_mean'), NUMBER)}
+                                'queries_mean', 'suppressed', 'invented'), NUMBER)}
     main = 'decline'
 
     def report(self, results: Results) -> Path:

@@ -30,9 +30,11 @@ _ATTACK: Columns = {
     'perturbation': _SETTING, 'surrogate': _SETTING, 'mode': _SETTING, 'ratio': NUMBER,
     'decline_ci95': INTERVAL,
     **dict.fromkeys(('edits_mean', 'queries_mean', 'decline_pp', 'suppressed', 'invented',
+                     'invented_elsewhere', 'left_out',
                      'unattackable'), NUMBER)}
 _SHARES = {'recall': 'recall', 'precision': 'precision'}
-_EFFORT = {'suppressed': 'suppressed', 'invented': 'invented', 'edits_mean': 'edits, mean',
+_EFFORT = {'suppressed': 'suppressed', 'invented': 'invented',
+           'invented_elsewhere': 'invented, certainly elsewhere', 'edits_mean': 'edits, mean',
            'queries_mean': 'queries, mean'}
 
 
@@ -43,7 +45,8 @@ class ReplayResults(ResultsKind):
     schema = SCHEMA
     columns = {'name': str, 'balanced_accuracy': NUMBER, 'balanced_accuracy_ci95': INTERVAL,
                **dict.fromkeys((*_SHARES, 'average_precision', 'accuracy', 'mcc', 'tp', 'tn',
-                                'wrong_matches', 'recall_at_100_precision'), NUMBER)}
+                                'wrong_matches', 'declared_elsewhere',
+                                'recall_at_100_precision'), NUMBER)}
     main = 'balanced accuracy'
 
     def check(self, results: Results) -> None:

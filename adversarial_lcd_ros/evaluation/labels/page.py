@@ -14,13 +14,15 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.page import STYLE, data_uri, load_template
+from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.writing import write_bytes, write_text
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from adversarial_lcd_ros.sequences import Trajectory
 
 # Kind, colour, and what it means.
@@ -31,7 +33,7 @@ LEGEND = (
     ('between', '#b9bec6', 'cannot be told, or shares too little: not scored'),
     ('no_candidate', '#dddfe3', 'too early: no frame is old enough'),
     ('no_ground_truth', '#000000', 'no ground truth pose'))
-PATH = 'path.svg'
+PATH, RULE = 'path.svg', 'labels.png'
 _HEIGHT, _GAP, _JPEG_QUALITY = 240, 6, 80
 
 
@@ -50,6 +52,7 @@ def write_page(folder: Path, row: Row, labels: FrameLabels, trajectory: Trajecto
                pairs: Sequence[PicturePair]) -> Path:
     """Write the path and the pairs as files, and report.html of them; return its path."""
     write_bytes(folder / PATH, draw_path(labels, trajectory))
+    write_bytes(folder / RULE, draw_rule(labels, trajectory, pairs))
     for pair in pairs:
         write_bytes(folder / f'{pair.kind}_{pair.frame}_{pair.older}.jpg', _side_by_side(pair))
     return render_page(folder, row)
@@ -77,24 +80,51 @@ def _frames_of(path: Path) -> tuple[int, int]:
 
 def draw_path(labels: FrameLabels, trajectory: Trajectory) -> bytes:
     """Return the camera's path seen along its flattest axis, each frame in its kind's colour."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.0, 5.0), layout='constrained')
+        _plot_path(figure.subplots(), labels, trajectory)
+        stream = io.BytesIO()
+        figure.savefig(stream, format='svg', metadata={'Date': None})
+    return stream.getvalue()
+
+
+def _plot_path(axes: Axes, labels: FrameLabels, trajectory: Trajectory) -> None:
     row = np.searchsorted(trajectory.stamp_ns, labels.stamp_ns)
     place = trajectory.position[np.minimum(row, len(trajectory) - 1)]
     across, up = np.sort(np.argsort(np.ptp(place, axis=0))[-2:])
     names = np.array(labels.names)
+    axes.plot(place[:, across], place[:, up], color='#dddfe3', linewidth=0.8, zorder=0)
+    for kind, colour, _ in reversed(LEGEND):
+        chosen = names == kind
+        if chosen.any():
+            axes.scatter(place[chosen, across], place[chosen, up], s=9, color=colour,
+                         label=f'{kind} ({int(chosen.sum())})')
+    axes.set(xlabel=f'{"xyz"[across]}, metres', ylabel=f'{"xyz"[up]}, metres', aspect='equal')
+    axes.legend(loc='best')
+
+
+def draw_rule(labels: FrameLabels, trajectory: Trajectory,
+              pairs: Sequence[PicturePair]) -> bytes:
+    """Return the path beside a pair of pictures of each kind, as PNG: labels in one picture."""
+    shown = [(kind, colour, text, [pair for pair in pairs if pair.kind == kind])
+             for kind, colour, text in LEGEND]
+    shown = [entry for entry in shown if entry[3]]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 5.0), layout='constrained')
-        axes = figure.subplots()
-        axes.plot(place[:, across], place[:, up], color='#dddfe3', linewidth=0.8, zorder=0)
-        for kind, colour, _ in reversed(LEGEND):
-            chosen = names == kind
-            if chosen.any():
-                axes.scatter(place[chosen, across], place[chosen, up], s=9, color=colour,
-                             label=f'{kind} ({int(chosen.sum())})')
-        axes.set(xlabel=f'{"xyz"[across]}, metres', ylabel=f'{"xyz"[up]}, metres',
-                 aspect='equal')
-        axes.legend(loc='best')
+        figure = Figure(figsize=(WIDE, 1.75 * max(len(shown), 2)), layout='constrained', dpi=110)
+        left, right = figure.subfigures(1, 2, width_ratios=(1.15, 1.0))
+        _plot_path(left.subplots(), labels, trajectory)
+        for axes, (kind, colour, text, there) in zip(
+                np.atleast_1d(right.subplots(max(len(shown), 1), 1)), shown, strict=False):
+            pair = there[len(there) // 2]
+            data = np.frombuffer(_side_by_side(pair), np.uint8)
+            axes.imshow(cv2.cvtColor(cv2.imdecode(data, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB))
+            axes.set_title(f'{kind}: {text.split(":")[0]}\nframe {pair.frame}, and {pair.older} '
+                           'before it', fontsize=8, loc='left')
+            axes.plot([-8, -8], [0, _HEIGHT], color=colour, linewidth=4, clip_on=False,
+                      scalex=False, scaley=False)
+            axes.axis('off')
         stream = io.BytesIO()
-        figure.savefig(stream, format='svg', metadata={'Date': None})
+        figure.savefig(stream, format='png', metadata={'Software': None})
     return stream.getvalue()
 
 

@@ -132,8 +132,8 @@ def pairs_to_look_at(labels: FrameLabels, position: NDArray[np.float64],
     """
     Return pairs (kind, frame, older frame) worth a look, spread over time.
 
-    A frame is shown with a frame that it makes a loop, or a change of scale, with; any other
-    with the older one that was taken nearest to it.
+    A frame is shown with a frame that it makes a loop with, or with the furthest one of a change
+    of scale; any other with the older one that was taken nearest to it.
     """
     row = np.minimum(np.searchsorted(stamp_ns, labels.stamp_ns), len(stamp_ns) - 1)
     place = position[row]
@@ -148,7 +148,8 @@ def pairs_to_look_at(labels: FrameLabels, position: NDArray[np.float64],
                        'scale': labels.scaled[frame, old]}.get(kind)
             among = old if fitting is None else old[fitting]
             apart = np.linalg.norm(place[among] - place[frame], axis=1)
-            chosen.append((kind, frame, int(among[np.argmin(apart)])))
+            at = np.argmax(apart) if kind == 'scale' else np.argmin(apart)
+            chosen.append((kind, frame, int(among[at])))
     return chosen
 
 

@@ -39,7 +39,30 @@ def markdown_tables(cells: Sequence[Summary], methods: Sequence[Summary], ratio:
         *(_target(target, [cell for cell in cells if cell['target'] == target],
                   [method for method in methods
                    if method['target'] == target and method['ratio'] == ratio], usual)
-          for target in targets)])
+          for target in targets),
+        *_one_sided(one_sided_rows(cells, usual))])
+
+
+def one_sided_rows(cells: Sequence[Summary], usual: Summary) -> list[dict[str, str]]:
+    """Return what attacks did where loops, or new places, are missing: heading to cell."""
+    return [{'sequence': cell['sequence'],
+             'target and attack': f'{cell["target"]}: {full_title(cell, usual)}',
+             'suppressed': _of(cell['suppressed'], cell['found_clean']),
+             'invented': _of(cell['invented'], cell['silent_clean']),
+             'certainly elsewhere': wording.mean_count(cell['invented_elsewhere'])}
+            for cell in cells if cell['decline_pp'] is None]
+
+
+def _of(part: float, whole: float) -> str:
+    return f'{wording.mean_count(part)} of {wording.mean_count(whole)}' if whole else _NONE
+
+
+def _one_sided(rows: Sequence[dict[str, str]]) -> list[str]:
+    if not rows:
+        return []
+    return ['Sequences without loops or without new places have no decline; what attacks did '
+            'there (means over the seeds):\n', _line(rows[0]), _line('---' for _ in rows[0]),
+            *(_line(row.values()) for row in rows), '']
 
 
 def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], usual: Summary
@@ -74,9 +97,16 @@ def _line(texts: Iterable[str]) -> str:
 
 
 def _sample(entries: Sequence[Summary | None]) -> str:
-    """Return over how many frames a sequence has been attacked, repeats included."""
-    counts = sorted({round(cell['frames'] * cell['seeds']) for cell in entries if cell})
-    return ' to '.join(f'{count}' for count in dict.fromkeys([counts[0], counts[-1]]))
+    """Return how many frames of a sequence have been attacked: repeats included, and once each."""
+    there = [cell for cell in entries if cell]
+    every = [round(cell['frames'] * cell['seeds']) for cell in there]
+    different = [cell['different_positives'] + cell['different_negatives'] for cell in there]
+    return (_range(every) if every == different
+            else f'{_range(every)} ({_range(different)} different)')
+
+
+def _range(counts: Sequence[int]) -> str:
+    return ' to '.join(f'{count}' for count in dict.fromkeys([min(counts), max(counts)]))
 
 
 def _count(value: float | None) -> str:

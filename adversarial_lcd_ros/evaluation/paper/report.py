@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_tem
 from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
 from adversarial_lcd_ros.evaluation.paper.exports import write_exports
-from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
+from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables, one_sided_rows
 from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     Summary,
@@ -82,7 +82,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Summary],
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
-        'headline': verdicts.headline(methods, ratio),
+        'headline': verdicts.headline(methods, ratio, cells),
         'best': verdicts.strongest(here, verdicts.main_target(here)),
         'warnings': verdicts.warnings(cells, groups[0] + groups[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
@@ -92,6 +92,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Summary],
             ('Surrogates', 'Perturbations'), groups, strict=False) if group],
         'surrogates': _blocks(groups[0]), 'perturbations': _blocks(groups[1]),
         'budgets': _blocks(groups[2]), 'notes': _notes(),
+        'one_sided': one_sided_rows([cell for cell in cells if cell['ratio'] == ratio], usual),
         'cells': _cells([cell for cell in cells if cell['ratio'] == ratio], usual),
         'block_s': intervals.BLOCK_S, **_plots(rows, cells, groups, ratio)}
 

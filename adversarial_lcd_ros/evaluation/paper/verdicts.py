@@ -51,13 +51,14 @@ def main_target(methods: Sequence[Summary]) -> str | None:
     return next((name for name in (*TARGETS, *sorted(there)) if name in there), None)
 
 
-def headline(methods: Sequence[Summary], ratio: float) -> str:
+def headline(methods: Sequence[Summary], ratio: float, cells: Sequence[Summary] = ()) -> str:
     """Return the main finding at a perturbation ratio in one or two sentences."""
     here = [method for method in methods if method['ratio'] == ratio]
     target = main_target(here)
     best = strongest(here, target)
     if best is None:
-        return 'No attack was measured on a sequence with both loops and new places.'
+        return ('No attack was measured on a sequence with both loops and new places.'
+                f'{_without_decline([cell for cell in cells if cell["ratio"] == ratio])}')
     count = len(best['sequences'])
     over = 'one sequence' if count == 1 else f'{count} sequences'
     title = f'{wording.attack_title({**best, "name": None})}, {best["nodes"]} features'
@@ -77,6 +78,18 @@ def headline(methods: Sequence[Summary], ratio: float) -> str:
     return (f'At r = {ratio:g} the strongest black-box attack on target {target} ({title}) took '
             f'{wording.points(best["decline_pp"])} points of balanced accuracy on average over '
             f'{over}{interval}, {accuracy}.{doubt}{yardstick}')
+
+
+def _without_decline(cells: Sequence[Summary]) -> str:
+    best = max((cell for cell in cells if cell['decline_pp'] is None and not is_yardstick(cell)),
+               key=lambda cell: cell['suppressed'] + cell['invented'], default=None)
+    if best is None:
+        return ''
+    return (f' The strongest, {wording.attack_title({**best, "name": None})} on target '
+            f'{best["target"]}, suppressed {wording.mean_count(best["suppressed"])} of '
+            f'{wording.mean_count(best["found_clean"])} loops found on {best["sequence"]}, and '
+            f'invented {wording.mean_count(best["invented"])} in '
+            f'{wording.mean_count(best["silent_clean"])} new places left alone.')
 
 
 def verdict(table: DeclineTable) -> str:
