@@ -30,7 +30,7 @@ from adversarial_lcd_ros.config import (
     setting,
 )
 from adversarial_lcd_ros.errors import ConfigError, with_suggestions
-from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
+from adversarial_lcd_ros.evaluation.frames.cells import JUDGED, ORACLES, Cell
 from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
@@ -58,9 +58,13 @@ class CellConfig(Config):
     threshold: float = setting(
         LcdConfig.threshold, 'Probability from which on the detectors declare a loop.', low=0.0,
         high=1.0)
+    judged: str = setting(
+        JUDGED[0], 'frames: a frame against the map, as by the detector; pairs: a frame against '
+        'one given reference and its window, half of them loops.', choices=JUDGED)
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
-        6, 'Frames with a loop, and as many at new places, for each seed.', low=1, high=100_000)
+        6, 'Frames with a loop, and as many at new places, for each seed; or pairs of each kind.',
+        low=1, high=100_000)
     seeds: int = setting(10, 'Seeds.', low=1, high=100_000)
 
 
