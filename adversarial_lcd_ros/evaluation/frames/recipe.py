@@ -9,13 +9,14 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
       - surrogate: [svm_rbf, svm_linear]
         ratio: [1e-4, 3e-4]
 
-A setting with a list is an axis: this recipe has four attacks. Beside the settings of the
+A setting with a list is an axis: this recipe has four attacks. An attack may say which ``part``
+of the recipe it is, and parts can be run alone. Beside the settings of the
 attacker an attack has those of ``CellConfig``; its search may be a yardstick.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import product
 import math
@@ -68,7 +69,7 @@ class CellConfig(Config):
     seeds: int = setting(10, 'Seeds.', low=1, high=100_000)
 
 
-def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
+def load_cells(name: str, overrides: Mapping[str, Any], only: Sequence[str] = ()) -> list[Cell]:
     """
     Return the cells of a recipe in its order, each once.
 
@@ -79,6 +80,8 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
     overrides : mapping
         Settings that win over those of every attack in the recipe. Of attacks that become equal
         by them the first counts.
+    only : sequence of str
+        Parts to take; all if none is named.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
                                if key in content}
     defaults = content.get('defaults') or {}
     cells: dict[str, Cell] = {}
-    for entry in content['attacks']:
+    for entry in _parts(path, content['attacks'], only):
         for values in _multiplied(path, {**general, **_mapping(path, 'defaults', defaults),
                                          **_mapping(path, 'an attack', entry), **overrides}):
             cell = _cell(path, values)
@@ -111,6 +114,20 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
         raise ConfigError(f'recipe {path}: {len(cells)} attacks with their seeds are {runs} '
                           f'cells on each sequence; expected at most {MAX_RUNS}')
     return list(cells.values())
+
+
+def _parts(path: Path, entries: list[Any], only: Sequence[str]) -> list[Any]:
+    """Return the attacks of some parts, without saying so any more."""
+    part_of = [entry.get('part') if isinstance(entry, dict) else None for entry in entries]
+    parts = {str(part): None for part in part_of if part is not None}
+    unknown = [part for part in only if part not in parts]
+    if unknown:
+        raise ConfigError(f'recipe {path} has no part {", ".join(unknown)}; there are: '
+                          f'{", ".join(parts) or "none"}')
+    return [{name: value for name, value in entry.items() if name != 'part'}
+            if isinstance(entry, dict) else entry
+            for entry, part in zip(entries, part_of, strict=True)
+            if not only or str(part) in only]
 
 
 def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:
