@@ -60,7 +60,7 @@ def test_the_command_line_wins(tmp_path):
 
 
 def test_of_attacks_made_equal_by_the_command_line_the_first_counts():
-    cells = load_cells('paper', {'nodes': 100, 'target': 'wl'})
+    cells = load_cells('paper', {'nodes': 100, 'target': 'wl'}, ['tables', 'sizes'])
     usual, = (cell for cell in cells if cell.attack.surrogate == 'naive_bayes')
     assert {cell.frames for cell in cells if cell.asked_target == 'wl'} == {usual.frames}
 
@@ -86,6 +86,37 @@ def test_of_attacks_made_equal_by_the_command_line_the_first_counts():
 def test_a_wrong_recipe_is_refused(tmp_path, text, said):
     with pytest.raises(ConfigError, match=said):
         load_cells(written(tmp_path, text), {})
+
+
+def test_parts_of_a_recipe_can_be_taken_alone(tmp_path):
+    recipe = written(tmp_path, """
+protocol: frames
+attacks:
+  - {part: mine, target: edges}
+  - &yours {part: yours, surrogate: none}
+  - {<<: *yours, search: recall}
+  - {search: optimum}
+""")
+    assert [cell.method for cell in load_cells(recipe, {})] == [
+        'eigencentrality', 'eigencentrality', 'recall', 'optimum']
+    assert [cell.method for cell in load_cells(recipe, {}, ['yours'])] == [
+        'eigencentrality', 'recall']
+    assert [cell.target for cell in load_cells(recipe, {}, ['yours', 'mine'])] == [
+        'edges', 'wl', 'wl']
+    with pytest.raises(ConfigError, match='no part ours; there are: mine, yours'):
+        load_cells(recipe, {}, ['ours'])
+
+
+def test_a_part_of_the_paper_recipe_has_the_cells_that_the_whole_has():
+    whole = [repr(cell) for cell in load_cells('paper', {})]
+    parts = ('tables', 'answers', 'thresholds', 'transfer', 'targets', 'sizes', 'pairs', 'retry',
+             'rivals')
+    found = [repr(cell) for part in parts for cell in load_cells('paper', {}, [part])]
+    assert set(found) == set(whole)
+    pairs = load_cells('paper', {}, ['pairs'])
+    assert {cell.judged for cell in pairs} == {'pairs'}
+    assert {(cell.target, cell.attack.retry) for cell in pairs if cell.search == 'stepwise'} >= {
+        ('wl', 'never'), ('wl', 'gained'), ('wl', 'set'), ('edges', 'gained')}
 
 
 def test_a_recipe_of_frames_does_not_replay():

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
 
-_OPTIONS = ('jobs', 'scheduler', 'seeds', 'cache')
+_OPTIONS = ('jobs', 'scheduler', 'seeds', 'only', 'cache')
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -48,6 +48,9 @@ def add_options(parser: ArgumentParser) -> None:
                        help='run on a Dask cluster, tcp://HOST:PORT, in place of local processes')
     group.add_argument('--seeds', type=int, metavar='N',
                        help='seeds of every attack: 42, 43, ... (default: what the recipe says)')
+    group.add_argument('--only', action='append', metavar='PART',
+                       help='a part of the recipe, alone or with others named the same way; what '
+                       'is finished is not run again (default: all)')
     group.add_argument('--cache', type=Path, metavar='FOLDER',
                        help='where built graphs are kept (default: in the cache of the user)')
 
@@ -75,7 +78,7 @@ def run(options: Namespace) -> None:
     lcd = config_from_options(options, LcdConfig)
     conditions = _conditions(options, lcd)
     cells = [replace(cell, conditions=conditions)
-             for cell in load_cells(options.recipe, _overrides(options))]
+             for cell in load_cells(options.recipe, _overrides(options), options.only or ())]
     folder = _folder(options)
     with open_store(folder) as store:
         streams = _open(options, sorted({cell.nodes for cell in cells}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 import hashlib
 from pathlib import Path
 
@@ -70,6 +70,11 @@ class Stream:
     graphs: GraphSource
     labels: FrameLabels
     digest: str
+
+    @cached_property
+    def pairs_digest(self) -> str:
+        """Digest of graphs, labels and the relation of all pairs, hexadecimal."""
+        return digest_of(self.digest.encode() + self.labels.relation.tobytes())
 
 
 def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,

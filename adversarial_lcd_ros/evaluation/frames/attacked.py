@@ -5,14 +5,15 @@ The stream is walked in order. The detector remembers every clean graph and the 
 each go by, but only a sample of the frames is attacked and judged, each against the map of clean
 graphs before it. In a live run (``live``, ``offline``) every frame is attacked and the map
 consists of attacked graphs; here frames do not hang on each other, and attacks with a thousand
-queries a frame can be compared over many seeds.
+queries a frame can be compared over many seeds. By pairs a sampled frame is judged against one
+given reference and its window instead (``pairs``); all else is the same.
 
 The sample hangs on seed and sequence only: all attacks meet the same frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import time
 from typing import Protocol
@@ -26,8 +27,16 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
+from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, FrameLabels
+from adversarial_lcd_ros.ground_truth.labels import (
+    ELSEWHERE,
+    NEGATIVE,
+    POSITIVE,
+    RIGHT,
+    UNTOLD,
+    FrameLabels,
+)
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery, LoopClosure
 
@@ -49,6 +58,8 @@ class FrameSample:
         What is said of a match with each frame of the stream: ``FrameLabels.judge``.
     told_by : str
         What told the labels, ``FrameLabels.told_by``.
+    reference : int64, (k,), optional
+        By pairs: the earlier frame that each is held against. None: it is held against the map.
 
     """
 
@@ -56,6 +67,7 @@ class FrameSample:
     kind: NDArray[np.int8]
     match_is: NDArray[np.str_]
     told_by: str = ''
+    reference: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
@@ -167,6 +179,30 @@ def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
     return FrameSample(frame, labels.kind[frame], match_is, labels.told_by)
 
 
+def sample_pairs(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
+    """
+    Draw loops, and as many pairs of different places (``pairs.draw_pairs``).
+
+    Parameters
+    ----------
+    labels : FrameLabels
+        Of the stream.
+    per_kind : int
+        Pairs of each kind.
+    seed : int
+        Of the cell.
+
+    """
+    query, kind, reference = draw_pairs(labels.relation, per_kind, seed)
+    match_is = np.full((len(query), len(labels.kind)), UNTOLD, f'<U{len(ELSEWHERE)}')
+    match_is[np.arange(len(query)), reference] = np.where(kind == POSITIVE, RIGHT, ELSEWHERE)
+    return FrameSample(query, kind, match_is, labels.told_by, reference)
+
+
+SAMPLES: Mapping[str, Callable[[FrameLabels, int, int], FrameSample]] = {
+    'frames': sample_frames, 'pairs': sample_pairs}
+
+
 def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],
                   lcd: LcdConfig, seed: int) -> list[list[FrameResult]]:
     """
@@ -180,7 +216,7 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     graphs : sequence of MultiTierGraph
         Clean graphs in order of time.
     sample : FrameSample
-        The frames to attack.
+        The frames to attack; all cells are judged as it says.
     cells : sequence of Cell
     lcd : LcdConfig
         Of the detectors, but for what the cells say.
@@ -194,12 +230,14 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
 
     """
     detectors: dict[LcdConfig, LoopClosureDetector] = {}
-    contests = [_contest(cell, lcd, seed, detectors) for cell in cells]
+    kind_of_detector = LoopClosureDetector if sample.reference is None else PairDetector
+    contests = [_contest(cell, lcd, seed, detectors, kind_of_detector) for cell in cells]
     place = {int(frame): row for row, frame in enumerate(sample.frame)}
     index_of = {graph.stamp_ns: index for index, graph in enumerate(graphs)}
     for index, graph in enumerate(graphs[:max(place, default=-1) + 1]):
         if index in place:
             row = place[index]
+            _hold_against(sample, row, detectors.values())
             # What flips leave alone is computed here, at the cost of no cell.
             clean = {config: detector.judge(graph) for config, detector in detectors.items()}
             for contest in contests:
@@ -213,23 +251,27 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     return [contest.results for contest in contests]
 
 
+def _hold_against(sample: FrameSample, row: int,
+                  detectors: Iterable[LoopClosureDetector]) -> None:
+    for detector in detectors:
+        if sample.reference is not None and isinstance(detector, PairDetector):
+            detector.reference = int(sample.reference[row])
+
+
 def _contest(cell: Cell, lcd: LcdConfig, seed: int,
-             detectors: dict[LcdConfig, LoopClosureDetector]) -> _Contest:
+             detectors: dict[LcdConfig, LoopClosureDetector],
+             make: type[LoopClosureDetector]) -> _Contest:
     lcd = replace(lcd, threshold=cell.threshold)
-    judging = _detector(replace(lcd, target=cell.target, hard_answers=False), detectors)
-    asked = _detector(replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'),
-                      detectors)
+    configs = (replace(lcd, target=cell.target, hard_answers=False),
+               replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'))
+    for config in configs:
+        if config not in detectors:
+            detectors[config] = make(config)
+    judging, asked = (detectors[config] for config in configs)
     attack = replace(cell.attack, seed=seed)
     adversary: _Adversary = (_Yardstick(Optimum(judging, attack))
                              if cell.search == Optimum.name else Attacker(attack))
     return _Contest(adversary, asked, judging)
-
-
-def _detector(config: LcdConfig,
-              detectors: dict[LcdConfig, LoopClosureDetector]) -> LoopClosureDetector:
-    if config not in detectors:
-        detectors[config] = LoopClosureDetector(config)
-    return detectors[config]
 
 
 def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, kind: int,

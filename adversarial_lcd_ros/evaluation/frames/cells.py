@@ -29,8 +29,9 @@ SCHEMA = 6
 # What makes the figures of a row.
 _CODE = ('attack', 'lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled',
          'messages', 'evaluation/metrics', 'evaluation/frames/attacked',
-         'evaluation/frames/optimum', 'evaluation/frames/rows')
+         'evaluation/frames/optimum', 'evaluation/frames/pairs', 'evaluation/frames/rows')
 ORACLES = ('soft', 'hard')
+JUDGED = ('frames', 'pairs')
 # Attack settings that have columns of their own.
 _COLUMNS = ('mode', *COLUMNS, 'ratio', 'edits', 'queries_per_edit', 'seed')
 # Files count by their content.
@@ -66,6 +67,8 @@ class Cell:
         Of the detectors: probability from which on a loop is declared.
     conditions : str
         Other settings of detector, graphs and labels that are not the default, in words.
+    judged : str
+        frames: against the map, the best candidate counts; pairs: against a given reference.
 
     """
 
@@ -80,6 +83,7 @@ class Cell:
     name: str = ''
     threshold: float = LcdConfig.threshold
     conditions: str = ''
+    judged: str = JUDGED[0]
 
     @property
     def method(self) -> str:
@@ -104,7 +108,8 @@ class Cell:
         return {'target': self.target, 'asked_target': self.asked_target, **self._columns,
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
-                'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant}
+                'nodes': self.nodes, 'threshold': self.threshold, 'judged': self.judged,
+                'variant': self.variant}
 
 
 def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.frames.attacked import (
+    SAMPLES,
     FrameResult,
     attack_frames,
-    sample_frames,
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
@@ -109,7 +109,7 @@ def _in_turns(groups: list[list[_Chosen]], count: int) -> Iterator[_Chosen]:
 
 def _again(stream: Stream, cell: Cell, row: Row, frame: dict[str, Any],
            lcd: LcdConfig) -> FrameResult | None:
-    sample = sample_frames(stream.labels, cell.frames, row['seed'])
+    sample = SAMPLES[cell.judged](stream.labels, cell.frames, row['seed'])
     results, = attack_frames(load_stream_graphs(stream.graphs), sample, [cell], lcd, row['seed'])
     found = next(result for result in results if result.result.clean.stamp_ns == frame['stamp'])
     change = found.result.change

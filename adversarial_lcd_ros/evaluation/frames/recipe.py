@@ -9,13 +9,14 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
       - surrogate: [svm_rbf, svm_linear]
         ratio: [1e-4, 3e-4]
 
-A setting with a list is an axis: this recipe has four attacks. Beside the settings of the
+A setting with a list is an axis: this recipe has four attacks. An attack may say which ``part``
+of the recipe it is, and parts can be run alone. Beside the settings of the
 attacker an attack has those of ``CellConfig``; its search may be a yardstick.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import product
 import math
@@ -31,7 +32,7 @@ from adversarial_lcd_ros.config import (
     setting,
 )
 from adversarial_lcd_ros.errors import ConfigError, with_suggestions
-from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
+from adversarial_lcd_ros.evaluation.frames.cells import JUDGED, ORACLES, Cell
 from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
 from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
@@ -59,13 +60,17 @@ class CellConfig(Config):
     threshold: float = setting(
         LcdConfig.threshold, 'Probability from which on the detectors declare a loop.', low=0.0,
         high=1.0)
+    judged: str = setting(
+        JUDGED[0], 'frames: a frame against the map, as by the detector; pairs: a frame against '
+        'one given reference and its window, half of them loops.', choices=JUDGED)
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
-        6, 'Frames with a loop, and as many at new places, for each seed.', low=1, high=100_000)
+        6, 'Frames with a loop, and as many at new places, for each seed; or pairs of each kind.',
+        low=1, high=100_000)
     seeds: int = setting(10, 'Seeds.', low=1, high=100_000)
 
 
-def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
+def load_cells(name: str, overrides: Mapping[str, Any], only: Sequence[str] = ()) -> list[Cell]:
     """
     Return the cells of a recipe in its order, each once.
 
@@ -76,6 +81,8 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
     overrides : mapping
         Settings that win over those of every attack in the recipe. Of attacks that become equal
         by them the first counts.
+    only : sequence of str
+        Parts to take; all if none is named.
 
     Raises
     ------
@@ -92,7 +99,7 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
                                if key in content}
     defaults = content.get('defaults') or {}
     cells: dict[str, Cell] = {}
-    for entry in content['attacks']:
+    for entry in _parts(path, content['attacks'], only):
         for values in _multiplied(path, {**general, **_mapping(path, 'defaults', defaults),
                                          **_mapping(path, 'an attack', entry), **overrides}):
             cell = _cell(path, values)
@@ -137,6 +144,20 @@ def load_labels(name: str, chosen: Mapping[str, Any]) -> dict[str, LabelConfig]:
                 for sequence, own in labels.items()}
     except ConfigError as error:
         raise ConfigError(f'recipe {path}: {error}') from error
+
+
+def _parts(path: Path, entries: list[Any], only: Sequence[str]) -> list[Any]:
+    """Return the attacks of some parts, without saying so any more."""
+    part_of = [entry.get('part') if isinstance(entry, dict) else None for entry in entries]
+    parts = {str(part): None for part in part_of if part is not None}
+    unknown = [part for part in only if part not in parts]
+    if unknown:
+        raise ConfigError(f'recipe {path} has no part {", ".join(unknown)}; there are: '
+                          f'{", ".join(parts) or "none"}')
+    return [{name: value for name, value in entry.items() if name != 'part'}
+            if isinstance(entry, dict) else entry
+            for entry, part in zip(entries, part_of, strict=True)
+            if not only or str(part) in only]
 
 
 def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:

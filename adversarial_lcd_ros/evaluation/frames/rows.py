@@ -18,7 +18,7 @@ _TRACE_POINTS = 8
 _TEXT, _NUMBER, _FIGURE = (str,), (int, float), (int, float, type(None))
 ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle',
-                     'mode', 'edits', 'variant', 'name', 'versions'), _TEXT),
+                     'mode', 'edits', 'judged', 'variant', 'name', 'versions'), _TEXT),
     **dict.fromkeys(('ratio', 'queries_per_edit', 'nodes', 'threshold', 'seed', 'frames',
                      'positives', 'negatives', 'suppressed', 'invented', 'left_out',
                      'invented_elsewhere', 'unattackable',

@@ -24,9 +24,9 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.attacked import (
+    SAMPLES,
     FrameSample,
     attack_frames,
-    sample_frames,
 )
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.rows import ROW_COLUMNS, are_frames, make_row
@@ -132,7 +132,8 @@ def plan_experiment(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdCo
         for stream in sorted(streams, key=lambda stream: stream.nodes):
             here = [cell for cell in cells
                     if cell.nodes == stream.nodes and seed < first_seed + cell.seeds]
-            named = [(cell_key(cell, seed, stream.digest, lcd), cell) for cell in here]
+            named = [(cell_key(cell, seed, stream.pairs_digest if cell.judged == 'pairs'
+                               else stream.digest, lcd), cell) for cell in here]
             keys += [key for key, _ in named]
             tasks += _tasks(stream, [entry for entry in named if entry[0] not in done], lcd, seed)
     return Experiment(tuple(keys), tuple(tasks), sum(key in done for key in keys))
@@ -140,11 +141,12 @@ def plan_experiment(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdCo
 
 def _tasks(stream: Stream, named: Sequence[tuple[str, Cell]], lcd: LcdConfig,
            seed: int) -> Iterator[Task]:
-    for per_kind in dict.fromkeys(cell.frames for _, cell in named):
-        sample = sample_frames(stream.labels, per_kind, seed)
+    for judged, per_kind in dict.fromkeys((cell.judged, cell.frames) for _, cell in named):
+        sample = SAMPLES[judged](stream.labels, per_kind, seed)
         part: list[tuple[str, Cell]] = []
         cost_s = _WALK_S
-        for entry in (entry for entry in named if entry[1].frames == per_kind):
+        for entry in (entry for entry in named
+                      if (entry[1].judged, entry[1].frames) == (judged, per_kind)):
             extra_s = len(sample.frame) * _expected_s(entry[1], stream.nodes_mean)
             if part and cost_s + extra_s > _TASK_S:
                 yield _task(stream, sample, part, lcd, seed, cost_s)

@@ -170,7 +170,7 @@ def optimum_shares(cells: Sequence[Summary], setting: Summary,
     chosen = [cell for cell in cells if cell['ratio'] == ratio
               and cell['asked_target'] == cell['target'] and cell['mode'] != 'pass'
               and all(cell[name] == setting[name] for name in
-                      (('target', 'nodes', 'threshold') if is_yardstick(cell)
+                      (('target', 'nodes', 'threshold', 'judged') if is_yardstick(cell)
                        else ('target', *_SHARED)))]
     methods_of: dict[str, str] = {}
     shares: dict[str, dict[str, float]] = {}

@@ -70,7 +70,7 @@ def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], u
     every = sorted({cell['sequence'] for cell in cells})
     sequences = sorted({cell['sequence'] for cell in cells if is_attackable(cell)}) or every
     before = {cell['sequence']: cell['balanced_clean'] for cell in cells
-              if all(cell[name] == usual[name] for name in ('nodes', 'threshold'))}
+              if all(cell[name] == usual[name] for name in ('nodes', 'threshold', 'judged'))}
     at = {(*(cell[name] for name in ATTACK), cell['sequence']): cell for cell in cells}
     head = [f'`{target}`', 'frames', 'edits', 'queries', *sequences, 'mean', 'of the optimum']
     lines = [_line(head), _line('---' for _ in head),

@@ -35,10 +35,11 @@ KIND, SCHEMA = 'frames', 6  # of summary.json
 
 # What tells cells apart, beside the seed; and what tells attacks apart, over sequences.
 CELL = ('sequence', 'target', 'asked_target', *COLUMNS, 'oracle', 'mode', 'ratio', 'edits',
-        'queries_per_edit', 'nodes', 'threshold', 'variant')
+        'queries_per_edit', 'nodes', 'threshold', 'judged', 'variant')
 ATTACK = CELL[1:]
 # What a row need not say.
-USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'variant': ''}
+USUAL: Mapping[str, Hashable] = {'threshold': LcdConfig.threshold, 'judged': 'frames',
+                                 'variant': ''}
 _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_attacked',
           'decline_pp', 'suppressed', 'invented', 'invented_elsewhere', 'left_out',
           'unattackable', 'frames', 'positives', 'negatives', 'nodes_mean', 'edges_mean',
@@ -216,9 +217,10 @@ def _right_before(rows: Sequence[Row]) -> tuple[float, float]:
 
 
 def _different_frames(rows: Sequence[Row]) -> dict[str, int]:
-    kinds = {frame['stamp']: kind for row in rows
-             for frame, kind in zip(row['frame_results'], _kinds(row), strict=True)}
-    counts = Counter(kinds.values())
+    # By pairs a frame may be the query of a loop with one seed and of another place with the next.
+    counts = Counter(kind for _, kind in {
+        (frame['stamp'], int(kind)) for row in rows
+        for frame, kind in zip(row['frame_results'], _kinds(row), strict=True)})
     return {'different_positives': counts[POSITIVE], 'different_negatives': counts[NEGATIVE]}
 
 
@@ -262,7 +264,8 @@ def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
 
 
 def _yardstick(cell: Summary) -> tuple[Hashable, ...]:
-    return tuple(cell[name] for name in ('sequence', 'target', 'ratio', 'nodes', 'threshold'))
+    return tuple(cell[name] for name in ('sequence', 'target', 'ratio', 'nodes', 'threshold',
+                                         'judged'))
 
 
 def _optima(cells: Iterable[Summary]) -> dict[tuple[Hashable, ...], float]:

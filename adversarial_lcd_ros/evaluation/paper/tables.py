@@ -33,7 +33,7 @@ from adversarial_lcd_ros.shown import Shown
 PAPER_RATIO = 3e-4
 PAPER_PERTURBATION, PAPER_SURROGATE = 'eigencentrality', 'svm_rbf'
 SETTING = ('target', 'oracle', 'mode', 'edits', 'queries_per_edit', 'nodes', 'threshold',
-           'variant')
+           'judged', 'variant')
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +114,8 @@ def setting_title(setting: Summary) -> str:
         parts.append(f'{setting["edits"]} only')
     if setting['threshold'] != USUAL['threshold']:
         parts.append(f'threshold {setting["threshold"]:g}')
+    if setting['judged'] != USUAL['judged']:
+        parts.append(f'judged by {setting["judged"]}')
     if setting.get('variant'):
         parts.append(setting['variant'])
     return ', '.join(parts)

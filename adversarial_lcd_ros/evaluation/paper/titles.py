@@ -12,7 +12,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import Summary
 
 _WORDS = {'nodes': '{} features', 'oracle': '{} answers',
           'queries_per_edit': '{} queries an edit', 'edits': 'edits: {}',
-          'threshold': 'threshold {}', 'variant': '{}'}
+          'threshold': 'threshold {}', 'judged': 'judged by {}', 'variant': '{}'}
 
 
 def usual_settings(cells: Sequence[Summary]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
@@ -39,10 +40,14 @@ def strongest(methods: Sequence[Summary], target: str | None = None) -> Summary 
     there = [method for method in methods
              if not is_yardstick(method) and method['asked_target'] == method['target']
              and method['mode'] != 'pass' and target in (None, method['target'])]
-    kinds = Counter((method['nodes'], method['threshold']) for method in there).most_common(1)
-    there = [method for method in there
-             if (method['nodes'], method['threshold']) == kinds[0][0]]
+    kinds = Counter(map(_kind_of, there)).most_common(1)
+    there = [method for method in there if _kind_of(method) == kinds[0][0]]
     return max(there, key=lambda method: method['decline_pp'], default=None)
+
+
+def _kind_of(method: Summary) -> tuple[Any, ...]:
+    """Return what declines hang on most, whatever the attack."""
+    return method['nodes'], method['threshold'], method['judged']
 
 
 def main_target(methods: Sequence[Summary]) -> str | None:
