@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from adversarial_lcd_ros import __version__
-from soak import nodes, offline, processes
+from soak import forgery, nodes, offline, processes
 from soak.outcome import Outcome
 
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'reliability.md'
@@ -69,6 +69,7 @@ def faults(work: Path, scales: Mapping[str, float]) -> Iterator[Callable[[], Out
     source = pictures(work / 'pictures')
     if 'payloads' in scales:
         yield lambda: offline.fuzz_codec(some('payloads', 1_000_000))
+        yield lambda: forgery.forge(some('payloads', 1_000_000))
     if 'files' in scales:
         yield lambda: offline.fuzz_files(some('files', 20_000), room('files'))
         yield lambda: offline.fuzz_config(some('files', 100_000))

@@ -12,7 +12,9 @@ from adversarial_lcd_ros.errors import CodecError, FileError
 from adversarial_lcd_ros.files.keys import make_key, read_key
 from adversarial_lcd_ros.messages.authentic import Gate
 from adversarial_lcd_ros.messages.codec import decode_graph, encode_graph
+from adversarial_lcd_ros.messages.payload import WIRE_TYPE, wrap
 from adversarial_lcd_ros.messages.sealing import SEAL_BYTES, Sealer
+from adversarial_lcd_ros.sequences.replay import BagRecorder, read_payloads
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)
 START, SECOND = 10**18, 10**9
@@ -100,6 +102,18 @@ def test_what_is_sealed_and_no_graph_is_refused_as_such():
     gate = Gate(KEY)
     assert cause(gate, Sealer(KEY, START).seal(b'no graph', START)) == 'unreadable'
     assert cause(gate, sealed(1)) == ''
+
+
+def test_a_recording_carries_seals_and_is_read_without_a_key(tmp_path):
+    messages = [sealed(number) for number in range(3)]
+    with BagRecorder(tmp_path / 'bag') as recorder:
+        for number, message in enumerate(messages):
+            recorder.write('graph', WIRE_TYPE, number, wrap(message))
+    recorded = [payload for _, payload in read_payloads(tmp_path / 'bag', 'graph')]
+    assert recorded == messages
+    assert [decode_graph(payload).sequence for payload in recorded] == [0, 1, 2]
+    gate = Gate(KEY)
+    assert [cause(gate, payload) for payload in recorded] == [''] * 3
 
 
 def test_a_key_is_new_each_time_and_for_its_owner_alone(tmp_path, capsys):

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-from soak import nodes, offline, processes  # noqa: E402
+from soak import forgery, nodes, offline, processes  # noqa: E402
 from soak.__main__ import keep, main, pictures, row  # noqa: E402
 from soak.outcome import Outcome, Slope  # noqa: E402
 
@@ -35,6 +35,16 @@ def kept(outcome, *expected):
 
 def test_damaged_payloads():
     kept(offline.fuzz_codec(1500), 'decoded', 'refused')
+
+
+def test_forged_graphs():
+    kept(forgery.forge(3000), 'forged: refused', 'changed: refused', 'cut: refused',
+         'replayed: refused', 'reordered: refused', 'stripped: refused', 'spliced: refused')
+
+
+def test_of_an_earlier_run_none_comes_back(monkeypatch):
+    monkeypatch.setattr(forgery, '_RUN', 20)
+    kept(forgery.forge(1500), 'of an earlier run: refused')
 
 
 def test_damaged_files(work):

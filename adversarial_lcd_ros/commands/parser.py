@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.commands import (
     build,
+    certify,
     clean,
     compare,
     compiling,
@@ -69,8 +70,8 @@ def make_parser() -> Parser:
     base: ArgumentParser = parser
     commands = base.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
-                compare.add, targets.add, train.add, fetch_model.add, compiling.add, clean.add,
-                labels.add, maps.add, inspect.add, convert.add, params.add, key.add):
+                compare.add, targets.add, certify.add, train.add, fetch_model.add, compiling.add,
+                clean.add, labels.add, maps.add, inspect.add, convert.add, params.add, key.add):
         add(commands)
     return parser
 

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.bound import Bound
 from adversarial_lcd_ros.lcd.single_flips import FlipChannel
 from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
 
@@ -38,6 +39,9 @@ class Target(ABC):
     flip_channels : tuple of FlipChannel classes
         What scores all single flips at once, one for each channel; without, flips are made and
         judged one by one.
+    bounds : sequence of Bound classes
+        What no few flips can do to each channel (lcd/bound_channels.py); without, there are no
+        certificates.
     trainer : str
         ``package.module:Class`` that trains the network of a target that has one
         (training/gnn.py); '': it needs none. Its network is the ONNX file beside its decision.
@@ -52,6 +56,7 @@ class Target(ABC):
     channels: ClassVar[tuple[str, ...]]
     feels: ClassVar[Feels] = Feels.EVERY
     flip_channels: ClassVar[Sequence[type[FlipChannel]]] = ()
+    bounds: ClassVar[Sequence[type[Bound]]] = ()
     trainer: ClassVar[str] = ''
     query_s: ClassVar[float] = 0.4e-3
     flip_s: ClassVar[float] = 0.3e-6

@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.bound import Bound
+from adversarial_lcd_ros.lcd.bound_channels import EdgeBound
 from adversarial_lcd_ros.lcd.flip_channels import EdgeFlips
 from adversarial_lcd_ros.lcd.single_flips import FlipChannel
 from adversarial_lcd_ros.lcd.targets.base import Target
@@ -21,6 +23,7 @@ class EdgesTarget(Target):
     name: ClassVar[str] = 'edges'
     channels: ClassVar[tuple[str, ...]] = ('edges',)
     flip_channels: ClassVar[Sequence[type[FlipChannel]]] = (EdgeFlips,)
+    bounds: ClassVar[Sequence[type[Bound]]] = (EdgeBound,)
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 1)."""

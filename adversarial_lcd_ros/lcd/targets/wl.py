@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.lcd.bound import Bound
+from adversarial_lcd_ros.lcd.bound_channels import EdgeBound, NeighbourhoodBound, ObjectBound
 from adversarial_lcd_ros.lcd.flip_channels import EdgeFlips, NeighbourhoodFlips, ObjectFlips
 from adversarial_lcd_ros.lcd.kernels import changed_nodes
 from adversarial_lcd_ros.lcd.single_flips import FlipChannel
@@ -23,6 +25,7 @@ class WlTarget(Target):
     channels: ClassVar[tuple[str, ...]] = ('edges', 'features', 'objects')
     flip_channels: ClassVar[Sequence[type[FlipChannel]]] = (
         EdgeFlips, NeighbourhoodFlips, ObjectFlips)
+    bounds: ClassVar[Sequence[type[Bound]]] = (EdgeBound, NeighbourhoodBound, ObjectBound)
 
     def compare(self, query: View, nodes: Comparison) -> NDArray[np.float64]:
         """Return the scores of a query with every reference, shape (r, 3)."""

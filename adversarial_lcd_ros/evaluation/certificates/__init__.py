@@ -1,0 +1,1 @@
+"""Certificates of a sequence: how much no few flips can turn over."""

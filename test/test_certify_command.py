@@ -1,0 +1,66 @@
+"""The command "certify": which decisions of a sequence no few flips can turn over."""
+
+from contextlib import contextmanager
+import json
+
+import pytest
+from walk_factory import walk_folder
+
+from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.evaluation import workers
+
+
+@pytest.fixture
+def command(tmp_path, vocabulary, monkeypatch):
+    """Return a function that runs the command on a short walk, in this process."""
+    @contextmanager
+    def one_process(jobs):
+        yield map
+    monkeypatch.setattr(workers, 'local_workers', one_process)
+    walk_folder(tmp_path / 'walk')
+    settings = {
+        'cache': tmp_path / 'cache', 'output': tmp_path / 'out', 'budget': 5,
+        'builder-detector': 'none', 'builder-vocabulary': vocabulary, 'builder-features': 20,
+        'builder-detected-features': 60, 'lcd-min-gap-s': 0.1, 'lcd-map-window': 0,
+        'label-rule': 'distance', 'label-min-gap-s': 0.1}
+
+    def run(*more):
+        options = [text for name, value in settings.items() for text in (f'--{name}', str(value))]
+        return main(['certify', str(tmp_path / 'walk'), *options, *more])
+    return run
+
+
+def test_a_row_for_each_detector_with_a_share_that_falls(tmp_path, command, capsys):
+    assert command('--targets', 'edges', 'vbow', '--defences', 'none', 'rederive') == 0
+    rows = json.loads((tmp_path / 'out' / 'certificates.json').read_text())['rows']
+    assert [(row['target'], row['defences']) for row in rows] == [
+        ('edges', 'none'), ('edges', 'rederive'), ('vbow', 'none'), ('vbow', 'rederive')]
+    for row in rows:
+        loops = row['classes']['loops']
+        assert loops['frames'] == 6
+        assert len(loops['certified']) == 6
+        assert loops['certified'] == sorted(loops['certified'], reverse=True)
+        assert max(loops['certified']) <= loops['frames']
+    # What edges cannot reach stands whatever the number of flips.
+    assert all(len(set(row['classes']['loops']['certified'])) == 1 for row in rows[1:])
+    table = (tmp_path / 'out' / 'certificates.md').read_text()
+    assert table in capsys.readouterr().out
+    assert '| walk | `edges, rederive` | loops | 6 |' in table
+    assert (tmp_path / 'out' / 'certificates.svg').read_bytes().startswith(b'<?xml')
+
+
+def test_frames_are_spread_over_the_sequence(tmp_path, command):
+    assert command('--targets', 'edges', '--defences', 'none', '--frames', '2') == 0
+    row, = json.loads((tmp_path / 'out' / 'certificates.json').read_text())['rows']
+    assert [row['classes'][name]['frames'] for name in ('new places', 'loops')] == [2, 2]
+
+
+@pytest.mark.parametrize(('options', 'error'), [
+    (('--targets', 'anchored'), 'nothing is proven of target anchored'),
+    (('--targets', 'edges', '--defences', 'own_defences:DropsLongEdges'),
+     'nothing is proven of a defence that makes other edges of a graph'),
+    (('--budget', '0'), '--budget 0: expected 1 or more'),
+    (('--lcd-target', 'wl'), 'here --targets says which')])
+def test_what_cannot_be_certified_is_said_at_once(command, capsys, options, error):
+    assert command(*options) == 2
+    assert error in capsys.readouterr().err
