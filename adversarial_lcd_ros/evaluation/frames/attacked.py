@@ -24,7 +24,7 @@ from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import Ask
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, FrameLabels
@@ -215,12 +215,13 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
 
 def _contest(cell: Cell, lcd: LcdConfig, seed: int,
              detectors: dict[LcdConfig, LoopClosureDetector]) -> _Contest:
-    lcd = replace(lcd, threshold=cell.threshold)
-    judging = _detector(replace(lcd, target=cell.target, hard_answers=False), detectors)
-    asked = _detector(replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'),
-                      detectors)
+    behind = detector_of(lcd, cell)
+    judging = _detector(replace(behind, target=cell.target, hard_answers=False), detectors)
+    known = behind if cell.aware else replace(lcd, threshold=cell.threshold)
+    asked = _detector(replace(known, target=cell.asked_target,
+                              hard_answers=cell.oracle == 'hard'), detectors)
     attack = replace(cell.attack, seed=seed)
-    adversary: _Adversary = (_Yardstick(Optimum(judging, attack))
+    adversary: _Adversary = (_Yardstick(Optimum(judging if cell.aware else asked, attack))
                              if cell.search == Optimum.name else Attacker(attack))
     return _Contest(adversary, asked, judging)
 

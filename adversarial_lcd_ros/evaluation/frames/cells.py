@@ -64,6 +64,10 @@ class Cell:
         For tables; may be empty.
     threshold : float
         Of the detectors: probability from which on a loop is declared.
+    detector : tuple of (str, value)
+        Other settings of the detector that are not those of the experiment: its defences.
+    aware : bool
+        The detector that answers queries has them, too; else it has those of the experiment.
 
     """
 
@@ -77,6 +81,8 @@ class Cell:
     seeds: int
     name: str = ''
     threshold: float = LcdConfig.threshold
+    detector: tuple[tuple[str, Any], ...] = ()
+    aware: bool = True
 
     @property
     def method(self) -> str:
@@ -93,9 +99,10 @@ class Cell:
     def variant(self) -> str:
         """Settings of the attack without a column of their own that are not the usual ones."""
         values = asdict(self.attack)
-        return ', '.join(f'{entry.name} {values[entry.name]}' for entry in fields(AttackConfig)
-                         if entry.name not in _COLUMNS + _FILES
-                         and values[entry.name] != entry.default)
+        own = [f'{entry.name} {values[entry.name]}' for entry in fields(AttackConfig)
+               if entry.name not in _COLUMNS + _FILES and values[entry.name] != entry.default]
+        own += [f'{name} {value}' for name, value in self.detector]
+        return ', '.join(own if self.aware else [*own, 'unaware'])
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -121,7 +128,7 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
 
     """
     detector = {name: value for name, value in asdict(
-        replace(lcd, threshold=cell.threshold)).items()
+        detector_of(lcd, cell)).items()
         if name not in ('target', 'hard_answers', 'model')}
     attack = {name: value for name, value in asdict(cell.attack).items()
               if name not in ('seed', *_FILES)}
@@ -133,10 +140,16 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     return digest_of(json.dumps(values, sort_keys=True).encode())
 
 
+def detector_of(lcd: LcdConfig, cell: Cell) -> LcdConfig:
+    """Return the settings of the detector that judges in a cell, but for its target."""
+    return replace(lcd, threshold=cell.threshold, **dict(cell.detector))
+
+
 def _own_code(cell: Cell, lcd: LcdConfig) -> list[str]:
     """Return digests of the classes of the user's own, which are named as package.module:Class."""
     attack = [value for name, value in asdict(cell.attack).items() if name not in _FILES]
-    named = [cell.target, cell.asked_target, cell.search, *names_in(lcd.defences), *attack]
+    defences = names_in(detector_of(lcd, cell).defences)
+    named = [cell.target, cell.asked_target, cell.search, *defences, *attack]
     return [named_code_digest(name) for name in dict.fromkeys(named)
             if isinstance(name, str) and ':' in name]
 

@@ -9,8 +9,10 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
       - surrogate: [svm_rbf, svm_linear]
         ratio: [1e-4, 3e-4]
 
-A setting with a list is an axis: this recipe has four attacks. Beside the settings of the
-attacker an attack has those of ``CellConfig``; its search may be a yardstick.
+A setting with a list is an axis: this recipe has four attacks. ``detector`` holds settings of the
+detector by name, such as ``{defences: geometric_check}``: attack and defence are chosen apart.
+Beside the settings of the attacker an attack has those of ``CellConfig``; its search may be a
+yardstick.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry
 # Without their seeds; the paper's experiments have some hundred.
 MAX_CELLS = 10_000
 MAX_RUNS = 1_000_000
+DETECTOR = 'detector'
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'attacks')
 
 
@@ -58,6 +61,8 @@ class CellConfig(Config):
     threshold: float = setting(
         LcdConfig.threshold, 'Probability from which on the detectors declare a loop.', low=0.0,
         high=1.0)
+    aware: bool = setting(
+        True, 'The detector that answers queries has the defences of the one attacked.')
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
         6, 'Frames with a loop, and as many at new places, for each seed.', low=1, high=100_000)
@@ -113,7 +118,7 @@ def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ConfigError(f'recipe {path}, {what}: expected NAME: VALUE, found {values!r}')
     known = [entry.name for config in (CellConfig, AttackConfig) for entry in fields(config)
-             if entry.name != 'seed']
+             if entry.name != 'seed'] + [DETECTOR]
     _check_names(path, what, values, known)
     return values
 
@@ -143,6 +148,8 @@ def _multiplied(path: Path, values: Mapping[str, Any]) -> Iterator[dict[str, Any
 
 def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     own_names = {entry.name for entry in fields(CellConfig)}
+    detector = _detector(path, values.get(DETECTOR))
+    values = {name: value for name, value in values.items() if name != DETECTOR}
     attack = {name: _number(value) if name in _FLOATS else value
               for name, value in values.items() if name not in own_names}
     search = attack.get('search', AttackConfig.search)
@@ -158,7 +165,24 @@ def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     except ConfigError as error:
         raise ConfigError(f'recipe {path}: {error}') from error
     known = asdict(own)
-    return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target})
+    return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target},
+                detector=detector)
+
+
+def _detector(path: Path, values: Any) -> tuple[tuple[str, Any], ...]:
+    values = {} if values is None else values
+    if not isinstance(values, dict):
+        raise ConfigError(f'recipe {path}, {DETECTOR}: expected settings by name, found '
+                          f'{values!r}')
+    taken = [name for name in ('target', 'threshold', 'hard_answers') if name in values]
+    if taken:
+        raise ConfigError(f'recipe {path}, {DETECTOR}: {", ".join(taken)} stand in the attack '
+                          'itself, hard_answers as oracle')
+    try:
+        checked = asdict(LcdConfig.from_mapping(values))
+    except ConfigError as error:
+        raise ConfigError(f'recipe {path}, {DETECTOR}: {error}') from error
+    return tuple((name, checked[name]) for name in sorted(values))
 
 
 def _number(value: Any) -> Any:
