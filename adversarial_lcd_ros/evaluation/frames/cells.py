@@ -110,7 +110,9 @@ class Cell:
         return {'target': self.target, 'asked_target': self.asked_target, **self._columns,
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
-                'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant}
+                'nodes': self.nodes, 'threshold': self.threshold, 'variant': self.variant,
+                'detector': ', '.join(f'{name} {value}' for name, value in self.detector),
+                'aware': self.aware}
 
 
 def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:

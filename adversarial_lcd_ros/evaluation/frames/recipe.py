@@ -34,7 +34,7 @@ from adversarial_lcd_ros.config import (
 from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.evaluation.frames.cells import ORACLES, Cell
 from adversarial_lcd_ros.evaluation.methods import used_settings
-from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+from adversarial_lcd_ros.evaluation.recipes import FRAMES, RINGS, SAMPLED, read_recipe
 from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
 
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
@@ -88,10 +88,11 @@ def load_cells(name: str, overrides: Mapping[str, Any]) -> list[Cell]:
 
     """
     path, content = read_recipe(name)
-    if content['protocol'] != FRAMES:
+    if content['protocol'] not in SAMPLED:
         raise ConfigError(f'recipe {path} is of the protocol "{content["protocol"]}": expected '
                           f'"{FRAMES}"')
-    _check_names(path, 'the recipe', content, _TOP)
+    _check_names(path, 'the recipe', content,
+                 (*_TOP, 'posters') if content['protocol'] == RINGS else _TOP)
     general: dict[str, Any] = {key: content[key] for key in ('seeds', 'frames')
                                if key in content}
     defaults = content.get('defaults') or {}
