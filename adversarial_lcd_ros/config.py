@@ -285,6 +285,16 @@ class AttackConfig(Config):
         'both', 'Recall: edges that it replays or erases, those between features or those at '
         'objects; both: the answers tell which, and without queries features.',
         choices=('both', 'features', 'objects'))
+    lengths: bool = setting(
+        False, 'Recall: only edges that are about as long in the graph of the past as here, as '
+        'a length check asks for (a factor of two).')
+    nearest: int = setting(
+        0, 'Recall: only edges added, and to one of so many nearest features, as a check passes '
+        'that makes edges again and is not sure of k; 0: all.', low=0, high=10_000)
+    moved: str = setting(
+        'close', 'Move_nodes: which features are moved: those that keep most edges of the past '
+        'among themselves (close), or some far apart before these, so that their hull is large '
+        '(spread).', choices=('close', 'spread'))
     nodes_moved: int = setting(
         40, 'Move_nodes: most features that are moved, their edges with them.', low=2,
         high=100_000)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 from graph_factory import flips_of, graphs, make_graph
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ import pytest
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.forging import (
     Change,
+    among_nearest,
     change_between,
     neighbours_of,
     with_positions,
@@ -214,3 +216,42 @@ def test_edge_attacks_keep_their_budget():
 def test_reports_of_version_1_are_read():
     report = codec.AttackReport(1, 'camera', 2, 'success', node_budget=7, nodes_moved=6)
     assert codec.decode_attack_report(codec.encode_attack_report(report)) == report
+
+
+def area(graph, rows):
+    return cv2.contourArea(cv2.convexHull(graph.position[rows]))
+
+
+def test_spread_nodes_have_a_larger_hull():
+    found = {}
+    for moved in ('close', 'spread'):
+        attacker = Attacker(AttackConfig(search='move_nodes', nodes_moved=8, moved=moved))
+        past, asked = walked(attacker), []
+        clean = alike(past[2])
+        attacker.attack(clean, spied(0.2, asked))
+        found[moved] = area(asked[1], (asked[1].position != clean.position).any(axis=1))
+    assert found['spread'] > found['close']
+
+
+@pytest.mark.parametrize('settings', [{'lengths': True}, {'nearest': 8}])
+def test_recall_keeps_to_what_a_check_passes(settings):
+    attacker = Attacker(AttackConfig(search='recall', ratio=0.02, **settings))
+    past, asked = walked(attacker), []
+    clean = alike(past[2])
+    attacker.attack(clean, spied(0.2, asked))
+    assert len(asked) > 1
+    for graph in asked[1:]:
+        pairs = clean.flips_to(graph).astype(np.int64)
+        assert not clean.has_edges(pairs).any()
+        if 'nearest' in settings:
+            assert among_nearest(clean, pairs, 8).all()
+        else:
+            # All features look like those of one graph, node for node.
+            here, there = clean.length_between(pairs), past[2].length_between(pairs)
+            assert (np.maximum(here, there) <= 2 * np.minimum(here, there) + 0.01).all()
+
+
+def test_who_may_only_add_suppresses_nothing():
+    attacker = Attacker(AttackConfig(search='recall', ratio=0.02, nearest=8))
+    past = walked(attacker)
+    assert attacker.attack(alike(past[2]), lambda graph: 0.9).queries == 1

@@ -143,3 +143,17 @@ def test_an_attack_over_budget_fails_the_experiment(lcd, monkeypatch, overspent)
         attack(self, *given), **overspent))
     with pytest.raises(EvaluationError, match='does not keep to its budgets'):
         attack_frames(stream(), SAMPLE, CELLS[:1], lcd, seed=0)
+
+
+def test_who_does_not_know_of_a_defence_asks_a_detector_without(lcd):
+    graphs = stream()
+    ask = replace(ATTACK, search='move_nodes', nodes_moved=20)
+    strict = (('geometric_check', True), ('geometric_inliers', 100_000))
+    known, unknown, none = attack_frames(graphs, SAMPLE, [
+        Cell('move_nodes', ask, 'wl', 'wl', 'soft', 30, 2, 1, detector=strict),
+        Cell('move_nodes', ask, 'wl', 'wl', 'soft', 30, 2, 1, detector=strict, aware=False),
+        Cell('move_nodes', ask, 'wl', 'wl', 'soft', 30, 2, 1)], lcd, 42)
+    assert not any(each.clean.is_loop or each.attacked.is_loop for each in (*known, *unknown))
+    assert [each.result.trace for each in unknown] == [each.result.trace for each in none]
+    assert [each.result.loss_before for each in known] != [
+        each.result.loss_before for each in none]

@@ -2,7 +2,9 @@
 
 import pytest
 
+from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.frames.cells import detector_of
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells, load_labels
 from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 
@@ -51,6 +53,31 @@ attacks:
         ('optimum', 1e-4, 'wl')]
     assert {(cell.seeds, cell.frames, cell.asked_target == cell.target) for cell in cells} == {
         (3, 2, True)}
+
+
+def test_attack_and_defence_are_chosen_apart(tmp_path):
+    cells = load_cells(written(tmp_path, """
+protocol: frames
+attacks:
+  - search: [recall, move_nodes]
+    aware: [true, false]
+    detector: [{}, {defences: geometric_check, geometric_inliers: 30}]
+"""), {})
+    assert len(cells) == 8
+    assert {cell.detector for cell in cells} == {
+        (), (('defences', 'geometric_check'), ('geometric_inliers', 30))}
+    assert 'defences geometric_check, geometric_inliers 30, unaware' in {
+        cell.variant for cell in cells}
+    detector = detector_of(LcdConfig(min_gap_s=3.0), cells[1])
+    assert (detector.geometric_inliers, detector.min_gap_s) == (30, 3.0)
+
+
+@pytest.mark.parametrize(('detector', 'said'), [
+    ('{target: wl}', 'stand in the attack itself'), ('[1, 2]', 'settings by name'),
+    ('{defences: moat}', 'no defence'), ('{gap: 1}', 'unknown setting')])
+def test_a_wrong_detector_is_refused(tmp_path, detector, said):
+    with pytest.raises(ConfigError, match=said):
+        load_cells(written(tmp_path, f'protocol: frames\nattacks: [{{detector: {detector}}}]'), {})
 
 
 def test_the_command_line_wins(tmp_path):

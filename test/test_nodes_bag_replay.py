@@ -1,5 +1,7 @@
 """The node bag_replay: byte for byte, nothing lost in lockstep, honest about what is missing."""
 
+from dataclasses import replace
+
 import cv2
 from graph_factory import make_graph
 import numpy as np
@@ -7,8 +9,9 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from adversarial_lcd_ros.attack.images.posting import Posting
-from adversarial_lcd_ros.config import BuilderConfig, ReplayConfig
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.frame import decode
@@ -265,3 +268,31 @@ def test_a_poster_is_in_the_graphs_of_its_span_as_offline(ros, bag, frames, pipe
     assert live == posted
     assert [one != other for one, other in zip(plain, posted, strict=True)] == [
         300_000_000 <= stamp - STAMPS[0] < 900_000_000 for stamp in STAMPS]
+
+
+@pytest.mark.parametrize(('attack', 'defences'), [
+    ({'search': 'recall', 'ratio': 0.003}, 'rederive'),
+    ({'search': 'recall', 'ratio': 0.003, 'lengths': True}, 'length_check'),
+    ({'search': 'move_nodes', 'nodes_moved': 20}, 'rederive,length_check'),
+    ({'search': 'replay'}, 'geometric_check')])
+def test_attacks_behind_defences_come_out_as_offline(ros, bag, vocabulary, lcd_model, tmp_path,
+                                                     attack, defences):
+    detector = {'model': lcd_model, 'min_gap_s': 1.0, 'defences': defences}
+    ros.start(LcdNode, **detector)
+    ros.start(GraphBuilderNode, 'graph:=graph_clean', detector='none', vocabulary=vocabulary,
+              features=60)
+    ros.start(AttackerNode, **attack)
+    node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'))
+    assert node.work(ros.spin) == 0
+    ros.stop(node)
+    clean, sent, decisions, reports = (
+        [read(payload) for _, payload in read_payloads(tmp_path / 'record', topic)]
+        for topic, read in (('graph_clean', codec.decode_graph), ('graph', codec.decode_graph),
+                            ('loop_closures', codec.decode_loop_closure),
+                            ('attack_report', codec.decode_attack_report)))
+    run, forwarded = run_offline(clean, LcdConfig(**detector), AttackConfig(**attack))
+    assert sent == forwarded
+    assert decisions == list(run.decisions)
+    assert [replace(report, duration_s=0.0) for report in reports] == [
+        replace(report, duration_s=0.0) for report in run.reports]
+    assert any(report.queries > 1 for report in reports)

@@ -88,6 +88,26 @@ def neighbours_of(graph: MultiTierGraph) -> int:
     return int(degree.min()) if len(degree) else 0
 
 
+def among_nearest(graph: MultiTierGraph, pairs: NDArray[np.int64], neighbours: int
+                  ) -> NDArray[np.bool_]:
+    """
+    Tell which pairs would be edges between features if more neighbours were joined, (k,).
+
+    Parameters
+    ----------
+    graph : MultiTierGraph
+    pairs : int64, (k, 2)
+        Source < target.
+    neighbours : int
+        Nearest features that each would be joined with.
+
+    """
+    edge = joined_pairs(graph.position, graph.size, graph.object_count, neighbours)
+    key = edge.astype(np.int64) @ (graph.node_count, 1)
+    near: NDArray[np.bool_] = np.isin(pairs @ (graph.node_count, 1), key)
+    return near & (pairs[:, 0] >= graph.object_count)
+
+
 def _changed_nodes(one: MultiTierGraph, other: MultiTierGraph) -> int:
     if one.node_count != other.node_count:
         return max(one.node_count, other.node_count)

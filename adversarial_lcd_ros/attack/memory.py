@@ -23,6 +23,7 @@ MIN_GAP_NS = 8_000_000_000
 MAX_HAMMING = 76
 CACHED = 256
 MAX_OBJECTS = 256
+LENGTH_FACTOR, LENGTH_SLACK = 2.0, 0.01
 MAX_BYTES = 2 ** 32
 
 
@@ -40,12 +41,21 @@ class Echo:
         How much alike the features at their ends look, 0 to 1; objects of a class are alike.
     at_object : bool, (k,)
         One of the ends is an object.
+    same_length : bool, (k,)
+        The edge is about as long in the past graph as it is, or would be, in the present one:
+        within a factor of two and a hundredth of the diagonal.
 
     """
 
     pairs: NDArray[np.int64]
     weight: NDArray[np.float64]
     at_object: NDArray[np.bool_]
+    same_length: NDArray[np.bool_]
+
+    def among(self, rows: NDArray[np.bool_]) -> Echo:
+        """Return some of the pairs."""
+        return Echo(self.pairs[rows], self.weight[rows], self.at_object[rows],
+                    self.same_length[rows])
 
 
 @dataclass(frozen=True)
@@ -137,8 +147,10 @@ class Memory:
         check_time()
         ends = past.edge.astype(np.int64)
         ends = ends[(node[ends] >= 0).all(axis=1)]
+        here, there = graph.length_between(node[ends]), past.length_between(ends)
+        same = np.maximum(here, there) <= LENGTH_FACTOR * np.minimum(here, there) + LENGTH_SLACK
         return Echo(np.sort(node[ends], axis=1), np.sqrt(alike[ends].prod(axis=1)),
-                    ends[:, 0] < past.object_count)
+                    ends[:, 0] < past.object_count, same)
 
 
 def _feature_lanes(graph: MultiTierGraph) -> NDArray[np.uint64]:

@@ -116,8 +116,8 @@ def _tasks(options: Namespace) -> list[CertificateTask]:
                  for target in options.targets for defences in options.defences]
     for config in detectors:
         check_provable(config)
-    builder, labels = (config_from_options(options, config)
-                       for config in (BuilderConfig, LabelConfig))
+    builder = config_from_options(options, BuilderConfig)
+    labels = config_from_options(options, LabelConfig)
     with progress_bar('graphs') as progress:
         streams = open_streams(options.sources, [builder.features], builder, labels,
                                options.cache, lambda _, done, total: progress(done, total))

@@ -23,7 +23,7 @@ Commands: TypeAlias = '_SubParsersAction[Any]'
 def add_command(commands: Commands, name: str, help: str,
                 run: Callable[[Namespace], None]) -> ArgumentParser:
     """Add a command that calls ``run`` with its options; return its parser."""
-    parser = commands.add_parser(name, help=help, description=help)
+    parser: ArgumentParser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(run=run, parser=parser)
     parser.add_argument('-q', '--quiet', action='store_true',
                         help='say nothing but results, warnings and errors')

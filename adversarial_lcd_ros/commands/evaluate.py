@@ -107,7 +107,7 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
 
 
 def _evaluate(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+    from adversarial_lcd_ros.evaluation.recipes import FRAMES, SAMPLED, read_recipe
     from adversarial_lcd_ros.evaluation.replay.recorded import is_recording
 
     path = Path(options.sources[0])
@@ -118,7 +118,7 @@ def _evaluate(options: Namespace) -> None:
         _report_recording(path, options)
         return
     options.recipe = options.recipe or RECIPE
-    if read_recipe(options.recipe)[1]['protocol'] == FRAMES:
+    if read_recipe(options.recipe)[1]['protocol'] in SAMPLED:
         options.sources = [imported_source(source, options) for source in options.sources]
         evaluate_frames.run(options)
         return

@@ -31,6 +31,7 @@ from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.frames.cells import Cell
     from adversarial_lcd_ros.evaluation.frames.run import Experiment
     from adversarial_lcd_ros.evaluation.store import Row
     from adversarial_lcd_ros.evaluation.streams import Stream
@@ -70,6 +71,7 @@ def run(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
     from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
+    from adversarial_lcd_ros.evaluation.recipes import RINGS, read_recipe
     from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
     from adversarial_lcd_ros.evaluation.store import open_store
 
@@ -93,11 +95,33 @@ def run(options: Namespace) -> None:
                  'there')
             raise
         write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
-        report = write_paper_report(folder, rows)
+        path, recipe = read_recipe(options.recipe)
+        report = (_rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
+                  if recipe['protocol'] == RINGS else write_paper_report(folder, rows))
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
         return
     _conclude(rows, time.monotonic() - started, report)
+
+
+def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
+           rows: list[Row], posters: tuple[Path, Any]) -> Path:
+    """Hang the posters of a recipe, measure what defences cost, write the page."""
+    from adversarial_lcd_ros.evaluation.rings.posters import poster_config
+    from adversarial_lcd_ros.evaluation.rings.report import (
+        measured_prices,
+        run_posters,
+        write_rings,
+    )
+
+    lcd = config_from_options(options, LcdConfig)
+    declared: list[Row] = []
+    if posters[1] is not None:
+        config, checks = poster_config(posters[1], posters[0])
+        with _workers(options) as workers, progress_bar('posters') as progress:
+            declared = run_posters(folder, streams, config, checks, lcd,
+                                   config_from_options(options, LabelConfig), workers, progress)
+    return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
 
 
 def _check(options: Namespace) -> None:

@@ -16,6 +16,9 @@ from adversarial_lcd_ros.paths import share_path
 FOLDER = 'config/recipes'
 # Every frame through the nodes, or a sample of frames without ROS (``frames``).
 LIVE, FRAMES = 'live', 'frames'
+# A sample of frames, attacks beside defences, and posters.
+RINGS = 'rings'
+SAMPLED = (FRAMES, RINGS)
 
 
 def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
@@ -38,9 +41,10 @@ def read_recipe(name: str) -> tuple[Path, dict[str, Any]]:
     if not isinstance(entries, list) or not entries:
         raise ConfigError(f'recipe {path}: expected a list "attacks"')
     protocol = content.setdefault('protocol', LIVE)
-    if protocol not in (LIVE, FRAMES):
+    if protocol not in (LIVE, *SAMPLED):
         raise ConfigError(f'recipe {path}: the protocol is {protocol!r}: expected "{LIVE}" '
-                          f'(every frame, through the nodes) or "{FRAMES}" (a sample of frames)')
+                          f'(every frame, through the nodes), "{FRAMES}" (a sample of frames) or '
+                          f'"{RINGS}" (attacks beside defences, and posters)')
     return path, content
 
 

@@ -122,7 +122,7 @@ def paste(image: NDArray[np.uint8], texture: NDArray[np.uint8], corners: NDArray
     weight = mask / 255.0
     if image.ndim == 3:
         lit, weight = lit[:, :, None], weight[:, :, None]
-    return np.clip(np.rint((1 - weight) * image + weight * lit), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint((1 - weight) * image + weight * lit), 0, 255), np.uint8)
 
 
 def swayed(corners: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.images.poster import Poster, frontal_corners, paste, swayed
-from adversarial_lcd_ros.config import NONE, ReplayConfig
+from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, ConfigError, SequenceError
 from adversarial_lcd_ros.messages.codec import typestore
+from adversarial_lcd_ros.registry import NONE
 from adversarial_lcd_ros.sequences.bagfile import COMPRESSED_IMAGE, IMAGE
 from adversarial_lcd_ros.sequences.encodings import message_pixels
 from adversarial_lcd_ros.sequences.frame import PNG, Frame, decode

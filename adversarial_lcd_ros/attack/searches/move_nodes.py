@@ -22,6 +22,8 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 RECALLED = 10
 # Orders in which the moved features of a loop change places.
 SHUFFLES = 5
+# Spread: one in so many of the moved features is at the rim.
+RIM_SHARE = 4
 
 
 class MoveNodes(Search):
@@ -37,7 +39,7 @@ class MoveNodes(Search):
     name: ClassVar[str] = 'move_nodes'
     rank: ClassVar[int] = 110
     colour: ClassVar[str] = '#7d3c98'
-    own_settings: ClassVar[tuple[str, ...]] = ('nodes_moved',)
+    own_settings: ClassVar[tuple[str, ...]] = ('nodes_moved', 'moved')
     query_share: ClassVar[float] = 0.01
 
     def __init__(self, config: AttackConfig) -> None:
@@ -88,7 +90,11 @@ class MoveNodes(Search):
         found = []
         for each in self._recalled(graph):
             check_time()
-            kept = _closest_knit(_joined(each), budget)
+            joined = _joined(each)
+            if self.config.moved == 'spread':
+                # Those at the rim hold the hull: they are worth more than any edge.
+                joined[_rim(each, budget // RIM_SHARE)] += len(joined)
+            kept = _closest_knit(joined, budget)
             position = graph.position.copy()
             position[each.node[kept]] = each.past.position[each.place[kept]]
             found.append(position)
@@ -122,6 +128,18 @@ def _joined(matched: Matched) -> NDArray[np.float64]:
     weight = np.sqrt(matched.alike[ends].prod(axis=1))
     joined[ends[:, 0], ends[:, 1]] = joined[ends[:, 1], ends[:, 0]] = weight
     return joined
+
+
+def _rim(matched: Matched, count: int) -> NDArray[np.int64]:
+    """Return matches far apart in the past graph, each the farthest from those before it."""
+    place = matched.past.position[matched.place].astype(np.float64)
+    far = np.linalg.norm(place - place.mean(axis=0), axis=1)
+    chosen: list[int] = []
+    for _ in range(min(count, len(place))):
+        chosen.append(int(far.argmax()))
+        distance = np.linalg.norm(place - place[chosen[-1]], axis=1)
+        far = distance if len(chosen) == 1 else np.minimum(far, distance)
+    return np.array(chosen, np.int64)
 
 
 def _closest_knit(joined: NDArray[np.float64], count: int) -> NDArray[np.int64]:

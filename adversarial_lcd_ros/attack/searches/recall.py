@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.forging import among_nearest
 from adversarial_lcd_ros.attack.memory import Echo, Memory
 from adversarial_lcd_ros.attack.search import Hunt, Search
 from adversarial_lcd_ros.config import AttackConfig
@@ -59,7 +60,7 @@ class Recall(Search):
     name: ClassVar[str] = 'recall'
     rank: ClassVar[int] = 100
     colour: ClassVar[str] = '#c0392b'
-    own_settings: ClassVar[tuple[str, ...]] = ('echoes',)
+    own_settings: ClassVar[tuple[str, ...]] = ('echoes', 'lengths', 'nearest')
     # Flips are grouped, many to a query.
     query_share: ClassVar[float] = 0.15
 
@@ -111,11 +112,12 @@ class Recall(Search):
     def _plans(self, graph: MultiTierGraph, edit_budget: int, is_loop: bool,
                recalled: int = RECALLED) -> list[_Plan]:
         """Return sets of flips, the most promising first."""
-        if self._edits == ('add' if is_loop else 'delete'):
+        if self._edits == ('add' if is_loop else 'delete') or (is_loop and self.config.nearest):
             return []
         windows = [self._memory.neighbours(index)
                    for index, _ in self._memory.similar(graph, recalled)]
-        echoes = {index: self._memory.echo(graph, index) for near in windows for index in near}
+        echoes = {index: self._unseen(graph, self._memory.echo(graph, index))
+                  for near in windows for index in near}
         # A loop has to be broken with all graphs at once, and made with one.
         together = ([list(echoes.values())] if is_loop
                     else [[echoes[index] for index in near] for near in windows])
@@ -124,6 +126,14 @@ class Recall(Search):
         return sorted((plan for plan in plans if len(plan.pairs)),
                       key=lambda plan: (-self._gain.get((is_loop, plan.family), 0.0),
                                         FAMILIES.index(plan.family), -plan.shared))
+
+    def _unseen(self, graph: MultiTierGraph, echo: Echo) -> Echo:
+        """Return the echoes that pass what the detector may look at, as far as he expects it."""
+        if self.config.lengths:
+            echo = echo.among(echo.same_length)
+        if self.config.nearest:
+            echo = echo.among(among_nearest(graph, echo.pairs, self.config.nearest))
+        return echo
 
 
 def _plan(graph: MultiTierGraph, echoes: list[Echo], edit_budget: int, family: str, *,

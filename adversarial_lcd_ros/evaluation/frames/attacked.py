@@ -25,7 +25,7 @@ from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import Ask
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -261,15 +261,16 @@ def _hold_against(sample: FrameSample, row: int,
 def _contest(cell: Cell, lcd: LcdConfig, seed: int,
              detectors: dict[LcdConfig, LoopClosureDetector],
              make: type[LoopClosureDetector]) -> _Contest:
-    lcd = replace(lcd, threshold=cell.threshold)
-    configs = (replace(lcd, target=cell.target, hard_answers=False),
-               replace(lcd, target=cell.asked_target, hard_answers=cell.oracle == 'hard'))
+    behind = detector_of(lcd, cell)
+    known = behind if cell.aware else replace(lcd, threshold=cell.threshold)
+    configs = (replace(behind, target=cell.target, hard_answers=False),
+               replace(known, target=cell.asked_target, hard_answers=cell.oracle == 'hard'))
     for config in configs:
         if config not in detectors:
             detectors[config] = make(config)
     judging, asked = (detectors[config] for config in configs)
     attack = replace(cell.attack, seed=seed)
-    adversary: _Adversary = (_Yardstick(Optimum(judging, attack))
+    adversary: _Adversary = (_Yardstick(Optimum(judging if cell.aware else asked, attack))
                              if cell.search == Optimum.name else Attacker(attack))
     return _Contest(adversary, asked, judging)
 

@@ -69,6 +69,10 @@ class Cell:
         Other settings of detector, graphs and labels that are not the default, in words.
     judged : str
         frames: against the map, the best candidate counts; pairs: against a given reference.
+    detector : tuple of (str, value)
+        Other settings of the detector that are not those of the experiment: its defences.
+    aware : bool
+        The detector that answers queries has them, too; else it has those of the experiment.
 
     """
 
@@ -84,6 +88,8 @@ class Cell:
     threshold: float = LcdConfig.threshold
     conditions: str = ''
     judged: str = JUDGED[0]
+    detector: tuple[tuple[str, Any], ...] = ()
+    aware: bool = True
 
     @property
     def method(self) -> str:
@@ -99,8 +105,9 @@ class Cell:
     @property
     def variant(self) -> str:
         """Settings without a column of their own that are not the usual ones."""
-        own = self.attack.changed(*_COLUMNS, *_FILES)
-        return ', '.join(filter(None, (own, self.conditions)))
+        behind = ', '.join(f'{name} {value}' for name, value in self.detector)
+        return ', '.join(filter(None, (self.attack.changed(*_COLUMNS, *_FILES), behind,
+                                       '' if self.aware else 'unaware', self.conditions)))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -109,7 +116,8 @@ class Cell:
                 'oracle': self.oracle, 'mode': self.attack.mode, 'ratio': self.attack.ratio,
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
                 'nodes': self.nodes, 'threshold': self.threshold, 'judged': self.judged,
-                'variant': self.variant}
+                'detector': ', '.join(f'{name} {value}' for name, value in self.detector),
+                'aware': self.aware, 'variant': self.variant}
 
 
 def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
@@ -127,7 +135,7 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
 
     """
     detector = {name: value for name, value in asdict(
-        replace(lcd, threshold=cell.threshold)).items()
+        detector_of(lcd, cell)).items()
         if name not in ('target', 'hard_answers', 'model')}
     attack = {name: value for name, value in asdict(cell.attack).items()
               if name not in ('seed', *_FILES)}
@@ -139,10 +147,16 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     return digest_of(json.dumps(values, sort_keys=True).encode())
 
 
+def detector_of(lcd: LcdConfig, cell: Cell) -> LcdConfig:
+    """Return the settings of the detector that judges in a cell, but for its target."""
+    return replace(lcd, threshold=cell.threshold, **dict(cell.detector))
+
+
 def _own_code(cell: Cell, lcd: LcdConfig) -> list[str]:
     """Return digests of the classes of the user's own, which are named as package.module:Class."""
     attack = [value for name, value in asdict(cell.attack).items() if name not in _FILES]
-    named = [cell.target, cell.asked_target, cell.search, *names_in(lcd.defences), *attack]
+    defences = names_in(detector_of(lcd, cell).defences)
+    named = [cell.target, cell.asked_target, cell.search, *defences, *attack]
     return [named_code_digest(name) for name in dict.fromkeys(named)
             if isinstance(name, str) and ':' in name]
 

@@ -10,8 +10,9 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
         ratio: [1e-4, 3e-4]
 
 A setting with a list is an axis: this recipe has four attacks. An attack may say which ``part``
-of the recipe it is, and parts can be run alone. Beside the settings of the
-attacker an attack has those of ``CellConfig``; its search may be a yardstick.
+of the recipe it is, and parts can be run alone. ``detector`` holds settings of the detector by
+name, such as ``{defences: geometric_check}``: attack and defence are chosen apart. Beside the
+settings of the attacker an attack has those of ``CellConfig``; its search may be a yardstick.
 """
 
 from __future__ import annotations
@@ -34,13 +35,14 @@ from adversarial_lcd_ros.config import (
 from adversarial_lcd_ros.errors import ConfigError, with_suggestions
 from adversarial_lcd_ros.evaluation.frames.cells import JUDGED, ORACLES, Cell
 from adversarial_lcd_ros.evaluation.methods import used_settings
-from adversarial_lcd_ros.evaluation.recipes import FRAMES, read_recipe
+from adversarial_lcd_ros.evaluation.recipes import FRAMES, RINGS, SAMPLED, read_recipe
 from adversarial_lcd_ros.registry import TARGETS, YARDSTICKS
 
 _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry.default, float))
 # Without their seeds; the paper's experiments have some hundred.
 MAX_CELLS = 10_000
 MAX_RUNS = 1_000_000
+DETECTOR = 'detector'
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'labels', 'attacks')
 
 
@@ -63,6 +65,8 @@ class CellConfig(Config):
     judged: str = setting(
         JUDGED[0], 'frames: a frame against the map, as by the detector; pairs: a frame against '
         'one given reference and its window, half of them loops.', choices=JUDGED)
+    aware: bool = setting(
+        True, 'The detector that answers queries has the defences of the one attacked.')
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
         6, 'Frames with a loop, and as many at new places, for each seed; or pairs of each kind.',
@@ -91,10 +95,11 @@ def load_cells(name: str, overrides: Mapping[str, Any], only: Sequence[str] = ()
 
     """
     path, content = read_recipe(name)
-    if content['protocol'] != FRAMES:
+    if content['protocol'] not in SAMPLED:
         raise ConfigError(f'recipe {path} is of the protocol "{content["protocol"]}": expected '
                           f'"{FRAMES}"')
-    _check_names(path, 'the recipe', content, _TOP)
+    _check_names(path, 'the recipe', content,
+                 (*_TOP, 'posters') if content['protocol'] == RINGS else _TOP)
     general: dict[str, Any] = {key: content[key] for key in ('seeds', 'frames')
                                if key in content}
     defaults = content.get('defaults') or {}
@@ -164,7 +169,7 @@ def _mapping(path: Path, what: str, values: Any) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ConfigError(f'recipe {path}, {what}: expected NAME: VALUE, found {values!r}')
     known = [entry.name for config in (CellConfig, AttackConfig) for entry in fields(config)
-             if entry.name != 'seed']
+             if entry.name != 'seed'] + [DETECTOR]
     _check_names(path, what, values, known)
     return values
 
@@ -194,6 +199,8 @@ def _multiplied(path: Path, values: Mapping[str, Any]) -> Iterator[dict[str, Any
 
 def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     own_names = {entry.name for entry in fields(CellConfig)}
+    detector = _detector(path, values.get(DETECTOR))
+    values = {name: value for name, value in values.items() if name != DETECTOR}
     attack = {name: _number(value) if name in _FLOATS else value
               for name, value in values.items() if name not in own_names}
     search = attack.get('search', AttackConfig.search)
@@ -209,7 +216,24 @@ def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     except ConfigError as error:
         raise ConfigError(f'recipe {path}: {error}') from error
     known = asdict(own)
-    return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target})
+    return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target},
+                detector=detector)
+
+
+def _detector(path: Path, values: Any) -> tuple[tuple[str, Any], ...]:
+    values = {} if values is None else values
+    if not isinstance(values, dict):
+        raise ConfigError(f'recipe {path}, {DETECTOR}: expected settings by name, found '
+                          f'{values!r}')
+    taken = [name for name in ('target', 'threshold', 'hard_answers') if name in values]
+    if taken:
+        raise ConfigError(f'recipe {path}, {DETECTOR}: {", ".join(taken)} stand in the attack '
+                          'itself, hard_answers as oracle')
+    try:
+        checked = asdict(LcdConfig.from_mapping(values))
+    except ConfigError as error:
+        raise ConfigError(f'recipe {path}, {DETECTOR}: {error}') from error
+    return tuple((name, checked[name]) for name in sorted(values))
 
 
 def _number(value: Any) -> Any:

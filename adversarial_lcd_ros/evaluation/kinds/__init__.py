@@ -17,6 +17,7 @@ from adversarial_lcd_ros.evaluation.kinds.frames import FramesResults
 from adversarial_lcd_ros.evaluation.kinds.labels import LabelsResults
 from adversarial_lcd_ros.evaluation.kinds.maps import MapResults
 from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
+from adversarial_lcd_ros.evaluation.kinds.rings import RingsResults
 from adversarial_lcd_ros.evaluation.kinds.targets import TargetsResults
 from adversarial_lcd_ros.evaluation.results import (
     CONFIGURATION,
@@ -26,7 +27,8 @@ from adversarial_lcd_ros.evaluation.results import (
 )
 
 KINDS: Mapping[str, ResultsKind] = {kind.name: kind for kind in (
-    ReplayResults(), FramesResults(), TargetsResults(), LabelsResults(), MapResults())}
+    ReplayResults(), FramesResults(), TargetsResults(), LabelsResults(), MapResults(),
+    RingsResults())}
 
 
 def is_results(path: Path) -> bool:

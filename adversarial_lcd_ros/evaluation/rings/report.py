@@ -1,0 +1,110 @@
+"""Results of the rings: summary.json, rings.md and its curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import json
+from pathlib import Path
+from typing import Any
+
+from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.environment import code_digest
+from adversarial_lcd_ros.errors import FileError
+from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.results import SUMMARY, summary_document
+from adversarial_lcd_ros.evaluation.rings.page import rings_page
+from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
+from adversarial_lcd_ros.evaluation.rings.posters import (
+    Checks,
+    PosterConfig,
+    counts,
+    poster_tasks,
+    run_pair,
+)
+from adversarial_lcd_ros.evaluation.rings.prices import decision_us
+from adversarial_lcd_ros.evaluation.rings.summaries import defence_title, summarise, worst_cases
+from adversarial_lcd_ros.evaluation.store import Row
+from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
+from adversarial_lcd_ros.evaluation.workers import Run
+from adversarial_lcd_ros.files import reading
+from adversarial_lcd_ros.files.digests import digest_of
+from adversarial_lcd_ros.files.writing import write_bytes, write_json, write_text
+
+KIND, SCHEMA = 'rings', 1
+PAGE, CURVES, POSTERS = 'rings.md', 'rings.svg', 'posters.json'
+SEED = 42
+_CODE = ('attack', 'lcd', 'vision', 'graph', 'edge_rule', 'evaluation/rings/posters',
+         'evaluation/rings/scene', 'evaluation/rings/walls')
+
+
+def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, checks: Checks,
+                lcd: LcdConfig, labels: LabelConfig, run: Run,
+                progress: Callable[[int, int], None]) -> list[Row]:
+    """
+    Return what was declared on each pair of places; what is in the folder is not run again.
+
+    Parameters
+    ----------
+    folder : Path
+    streams : sequence of Stream
+    config, checks
+        Of the recipe.
+    lcd, labels
+        Settings.
+    run : callable
+        From ``local_workers`` or ``dask_workers``.
+    progress : callable
+        Called with pairs done and to do.
+
+    """
+    digest = digest_of(json.dumps([repr(config), repr(checks), repr(lcd), repr(labels),
+                                   sorted(stream.digest for stream in streams),
+                                   code_digest(*_CODE)]).encode())
+    path = folder / POSTERS
+    try:
+        known = reading.read_json(path) if path.is_file() else None
+    except FileError:
+        known = None
+    if isinstance(known, dict) and known.get('digest') == digest:
+        found: list[Row] = known['rows']
+        return found
+    tasks = [task for stream in streams
+             for task in poster_tasks(stream, config, lcd, checks, labels)]
+    rows: list[Row] = []
+    for done, part in enumerate(run(run_pair, tasks), 1):
+        rows += part
+        progress(done, len(tasks))
+    rows.sort(key=lambda row: (row['sequence'], row['later']))
+    write_json(path, {'digest': digest, 'rows': rows})
+    return rows
+
+
+def measured_prices(streams: Sequence[Stream], cells: Sequence[Cell],
+                    lcd: LcdConfig) -> list[Row]:
+    """Return what each defence of some cells costs on each sequence, in time of a decision."""
+    detectors = list(dict.fromkeys([(), *(cell.detector for cell in cells)]))
+    rows: list[Row] = []
+    for stream in streams:
+        spent = decision_us(load_stream_graphs(stream.graphs), lcd, detectors)
+        rows += [{'sequence': stream.name, 'decision_us': us, 'more_us': us - spent[0],
+                  'defence': defence_title({
+                      'detector': ', '.join(f'{name} {value}' for name, value in settings),
+                      'threshold': LcdConfig.threshold})}
+                 for settings, us in zip(detectors, spent, strict=True)]
+    return rows
+
+
+def write_rings(folder: Path, rows: Sequence[Row], posters: Sequence[Row],
+                prices: Sequence[Row]) -> Path:
+    """Write summary.json and the page of finished cells and posters; return the page's path."""
+    write_json(folder / SUMMARY, summary_document(KIND, SCHEMA, summarise(rows, SEED), {
+        'worst': worst_cases(rows, SEED), 'posters': counts(posters), 'prices': list(prices)}))
+    return write_page(folder, reading.read_json(folder / SUMMARY))
+
+
+def write_page(folder: Path, summary: Mapping[str, Any], command: str = '') -> Path:
+    """Write rings.md and its curves from the content of summary.json; return the page's path."""
+    write_bytes(folder / CURVES, ring_curves(summary))
+    path = folder / PAGE
+    write_text(path, rings_page(summary, command) + f'\n![curves]({CURVES})\n')
+    return path

@@ -1,0 +1,148 @@
+"""What attacks come to beside each defence: cells of the matrix, and worst cases."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adversarial_lcd_ros.evaluation import metrics
+from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
+from adversarial_lcd_ros.evaluation.store import Row
+from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE
+
+# What an attacker changes, by his search; all else flips edges.
+NODE_SEARCHES = ('move_nodes', 'replay')
+FLIPS, NODES = 'flips', 'nodes'
+Summary = dict[str, Any]
+_GROUP = ('sequence', 'target', 'detector', 'threshold', 'name', 'search', 'aware', 'ratio',
+          'variant')
+
+
+def ring_of(row: Mapping[str, Any]) -> str:
+    """Return what an attack changes: FLIPS or NODES."""
+    return NODES if row['search'] in NODE_SEARCHES else FLIPS
+
+
+def defence_title(row: Mapping[str, Any]) -> str:
+    """Return the defences of a row in words."""
+    words = [row['detector']] if row['detector'] else []
+    if row['threshold'] != 0.5:
+        words.append(f'threshold {row["threshold"]:g}')
+    return ', '.join(words) or 'none'
+
+
+def attack_name(row: Mapping[str, Any]) -> str:
+    """Return what a recipe calls an attack, and whether it knows of the defences."""
+    name = str(row['name'] or row['search'])
+    return name if row['aware'] else f'{name}, unaware'
+
+
+def summarise(rows: Sequence[Row], seed: int) -> list[Summary]:
+    """
+    Return one entry for each attack, defence and sequence, seeds together.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of cells.
+    seed : int
+        Of the bootstrap, which draws frames.
+
+    """
+    groups: dict[tuple[Any, ...], list[Row]] = defaultdict(list)
+    for row in rows:
+        groups[tuple(row[name] for name in _GROUP)].append(row)
+    return [_entry(group, seed) for group in groups.values()]
+
+
+def _entry(rows: Sequence[Row], seed: int) -> Summary:
+    first = rows[0]
+    frames = [frame for row in rows for frame in row['frame_results']]
+    kind = np.array([frame['kind'] for frame in frames], np.int8)
+    before, after = (np.array([frame[when] for frame in frames])
+                     for when in ('clean', 'attacked'))
+    change = metrics.effect(kind, before, after)
+    stamps = [frame['stamp'] for frame in frames]
+    lost = metrics.right(before).astype(np.int64) - metrics.right(after)
+    return {
+        **{name: first[name] for name in _GROUP}, 'ring': ring_of(first),
+        'attack': attack_name(first), 'defence': defence_title(first),
+        'seeds': len(rows), 'frames': len(frames), 'different_frames': len(set(stamps)),
+        'positives': int((kind == POSITIVE).sum()), 'negatives': int((kind == NEGATIVE).sum()),
+        'found_clean': int((before == 'TP').sum()), 'silent_clean': int((before == 'TN').sum()),
+        'balanced_clean': metrics.balanced_accuracy(kind, before),
+        'balanced_attacked': metrics.balanced_accuracy(kind, after),
+        'decline_pp': change.decline_pp,
+        'ci95': _times(_interval(stamps, metrics.told_kind(kind, before, after), lost, seed),
+                       100.0),
+        'suppressed': change.suppressed, 'invented': change.invented,
+        'invented_elsewhere': sum(
+            frame['attacked_is'] == ELSEWHERE and (frame['clean'], frame['attacked']) ==
+            ('TN', 'FP') for frame in frames),
+        'edits_mean': _mean(frame['edits'] for frame in frames),
+        'nodes_moved_mean': _mean(frame['nodes_moved'] for frame in frames),
+        'node_budget_mean': _mean(frame['node_budget'] for frame in frames),
+        'queries_mean': _mean(frame['queries'] for frame in frames)}
+
+
+def worst_cases(rows: Sequence[Row], seed: int) -> list[Summary]:
+    """
+    Return for each defence and sequence what is left against the strongest attack on each frame.
+
+    As RobustBench counts: a frame is held if every attack of the ring fails on it. One entry for
+    FLIPS, one for FLIPS and NODES together.
+    """
+    groups: dict[tuple[str, str, str], list[Row]] = defaultdict(list)
+    for row in rows:
+        groups[row['sequence'], row['target'], defence_title(row)].append(row)
+    return [_worst(key, group, rings, seed) for key, group in groups.items()
+            for rings in ((FLIPS,), (FLIPS, NODES))
+            if any(ring_of(row) in rings for row in group)]
+
+
+def _worst(key: tuple[str, str, str], rows: Sequence[Row], rings: tuple[str, ...],
+           seed: int) -> Summary:
+    held: dict[tuple[int, int], list[bool]] = defaultdict(list)
+    kinds: dict[tuple[int, int], int] = {}
+    attacks = set()
+    for row in (row for row in rows if ring_of(row) in rings):
+        attacks.add((attack_name(row), row['ratio'], row['variant']))
+        for frame in row['frame_results']:
+            if 'UM' not in (frame['clean'], frame['attacked']):
+                at = row['seed'], frame['stamp']
+                kinds[at] = frame['kind']
+                held[at].append(frame['attacked'] in ('TP', 'TN')
+                                and frame['clean'] in ('TP', 'TN'))
+    kind = np.array([kinds[at] for at in held], np.int8)
+    right = np.array([all(each) for each in held.values()], np.int64)
+    rates = [right[kind == value] for value in (POSITIVE, NEGATIVE)]
+    return {'sequence': key[0], 'target': key[1], 'defence': key[2], 'rings': '+'.join(rings),
+            'attacks': len(attacks), 'frames': len(held),
+            'balanced': (float(np.mean([rate.mean() for rate in rates]))
+                         if all(map(len, rates)) else None),
+            'ci95': _interval([stamp for _, stamp in held], kind, right, seed)}
+
+
+def _interval(stamps: Sequence[int], kind: NDArray[np.int8], value: NDArray[np.int64],
+              seed: int) -> list[float] | None:
+    """Return the 95 % interval of a balanced mean; a frame drawn by several seeds is one."""
+    known, place = np.unique(np.array(stamps, np.int64), return_inverse=True)
+    size, total = np.zeros((2, len(known)), np.int64), np.zeros((2, len(known)), np.int64)
+    for row, wanted in enumerate((POSITIVE, NEGATIVE)):
+        np.add.at(size[row], place[kind == wanted], 1)
+        np.add.at(total[row], place[kind == wanted], value[kind == wanted])
+    found = class_mean_interval(size, total, 1, seed) if len(known) else None
+    return None if found is None else list(found)
+
+
+def _times(interval: list[float] | None, factor: float) -> list[float] | None:
+    return None if interval is None else [factor * bound for bound in interval]
+
+
+def _mean(values: Iterable[float]) -> float:
+    found = list(values)
+    return float(np.mean(found)) if found else 0.0

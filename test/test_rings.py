@@ -1,0 +1,216 @@
+"""Rings: walls and posters in views, worst cases, the page, and the recipe as a whole."""
+
+from dataclasses import replace
+import json
+
+import cv2
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.recipes import read_recipe
+from adversarial_lcd_ros.evaluation.rings.page import rings_page
+from adversarial_lcd_ros.evaluation.rings.posters import (
+    PosterConfig,
+    conditions_of,
+    counts,
+    poster_config,
+)
+from adversarial_lcd_ros.evaluation.rings.report import write_rings
+from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME, Condition, Scene
+from adversarial_lcd_ros.evaluation.rings.summaries import (
+    FLIPS,
+    NODES,
+    defence_title,
+    summarise,
+    worst_cases,
+)
+from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
+
+CAMERA = Camera(np.eye(3), np.zeros(3), 0.785, 640, 480)
+
+
+def slanted(slope, far=3.0, rows=48, columns=64):
+    """Return the depth of a wall that recedes to the right."""
+    x = (np.arange(columns) + 0.5 - columns / 2) / (0.785 * columns)
+    return np.repeat((far / (1 - slope * x))[None].astype(np.float32), rows, axis=0)
+
+
+@settings(max_examples=30)
+@given(st.floats(-0.8, 0.8), st.sampled_from([0.02, 0.05, 0.1]), st.integers(0, 99))
+def test_a_square_on_a_wall_is_of_its_size_and_square(slope, share, seed):
+    world = find_wall(CAMERA, slanted(slope), share, np.random.default_rng(seed))
+    if world is None:
+        return  # no place tried had room for it
+    pixels = CAMERA.pixels(world)
+    area = cv2.contourArea(pixels.astype(np.float32)) / (640 * 480)
+    assert abs(area - share) < 0.1 * share
+    sides = np.linalg.norm(world - np.roll(world, 1, axis=0), axis=1)
+    np.testing.assert_allclose(sides, sides[0], rtol=1e-6)
+    # On the plane: depth is what the wall's is there.
+    x = (pixels[:, 0] - 320) / (0.785 * 640)
+    np.testing.assert_allclose(world[:, 2], 3.0 / (1 - slope * x), rtol=0.02)
+    # From the upper left on, clockwise as seen.
+    assert pixels[0, 0] < pixels[1, 0]
+    assert pixels[0, 1] < pixels[3, 1]
+
+
+def test_most_of_a_plain_wall_has_room():
+    found = [find_wall(CAMERA, slanted(0.3), 0.05, np.random.default_rng(seed))
+             for seed in range(20)]
+    assert sum(each is not None for each in found) >= 19
+
+
+def test_no_wall_where_depth_is_unknown_or_rough():
+    rough = np.random.default_rng(1).uniform(1, 4, (48, 64)).astype(np.float32)
+    for depth in (np.zeros((48, 64), np.float32), rough):
+        assert find_wall(CAMERA, depth, 0.05, np.random.default_rng(1)) is None
+
+
+def test_another_camera_sees_the_same_square_where_it_is():
+    moved = replace(CAMERA, centre=np.array([0.5, 0.0, 0.0]))
+    world = find_wall(CAMERA, slanted(0.0), 0.05, np.random.default_rng(1))
+    shift = moved.pixels(world) - CAMERA.pixels(world)
+    np.testing.assert_allclose(shift[:, 0], -0.5 * 0.785 * 640 / 3.0, rtol=1e-6)
+    np.testing.assert_allclose(shift[:, 1], 0, atol=1e-9)
+    assert moved.pixels(world - (0, 0, 5)) is None
+
+
+def scene(depth=True):
+    image = {index: np.full((480, 640, 3), 128, np.uint8) for index in (3, 4, 5, 9)}
+    cameras = {index: replace(CAMERA, centre=np.array([0.1 * index, 0, 0])) for index in image}
+    return Scene(((4, 3, 5), (9,)), image, cameras if depth else {},
+                 {index: slanted(0.1) for index in image} if depth else {}, 7)
+
+
+@pytest.mark.parametrize('depth', [True, False])
+def test_a_scene_is_posted_in_all_its_frames_and_repeatably(depth):
+    condition = Condition('cells', 0.05)
+    posted, walls = scene(depth).posted(condition)
+    again, _ = scene(depth).posted(condition)
+    assert walls == (2 if depth else 0)
+    for index, image in posted.items():
+        changed = (image != 128).any(axis=2).mean()
+        assert 0.025 < changed < 0.1
+        np.testing.assert_array_equal(image, again[index])
+
+
+def test_controls_and_two_posters():
+    bare, _ = scene().posted(Condition('none', 0.0, 0, BARE))
+    assert all((image == 128).all() for image in bare.values())
+    same, other = (scene().posted(Condition('cells', 0.1, 1, control))[0]
+                   for control in (SAME, OTHER))
+    np.testing.assert_array_equal(same[4], other[4])
+    assert (same[9] != other[9]).any()
+    two, walls = scene().posted(Condition('cells', 0.1, 2))
+    parts = cv2.connectedComponents((np.abs(two[9].astype(int) - 128) > 40).any(
+        axis=2).astype(np.uint8) * 255)[0]
+    assert walls == 0
+    assert parts > 2
+    assert 0.05 < (two[9] != 128).any(axis=2).mean() < 0.2
+
+
+def row(detector, search, name, outcomes, aware=True, seed=42, **more):
+    frames = [{'stamp': stamp, 'kind': kind, 'clean': clean, 'attacked': attacked,
+               'attacked_is': 'elsewhere' if attacked == 'FP' else '', 'edits': 3, 'queries': 5,
+               'nodes_moved': 2, 'node_budget': 4, 'edit_budget': 3}
+              for stamp, (kind, clean, attacked) in enumerate(outcomes)]
+    return {'sequence': 'tour', 'target': 'wl', 'detector': detector, 'threshold': 0.5,
+            'name': name, 'search': search, 'aware': aware, 'ratio': 3e-4, 'variant': '',
+            'seed': seed, 'frame_results': frames, **more}
+
+
+KEPT, LOST = (1, 'TP', 'TP'), (1, 'TP', 'FN')
+LEFT, MADE = (-1, 'TN', 'TN'), (-1, 'TN', 'FP')
+ROWS = [row('', 'recall', 'recall', [KEPT, LOST, LEFT, MADE]),
+        row('', 'move_nodes', '40 nodes', [LOST, KEPT, LEFT, MADE]),
+        row('defences rederive', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT]),
+        row('defences rederive', 'replay', 'replay', [KEPT, KEPT, MADE, MADE], aware=False)]
+
+
+def test_an_entry_counts_what_changed():
+    entry = summarise(ROWS, 1)[0]
+    assert (entry['suppressed'], entry['invented'], entry['invented_elsewhere']) == (1, 1, 1)
+    assert (entry['balanced_clean'], entry['balanced_attacked']) == (1.0, 0.5)
+    assert entry['decline_pp'] == 50
+    assert entry['ring'] == FLIPS
+    assert [each['attack'] for each in summarise(ROWS, 1)][3] == 'replay, unaware'
+
+
+def test_seeds_of_an_attack_are_one_entry():
+    again = row('', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT], seed=43)
+    entry = summarise([ROWS[0], again], 1)[0]
+    assert (entry['seeds'], entry['frames'], entry['different_frames']) == (2, 8, 4)
+    assert entry['decline_pp'] == 25
+
+
+def test_the_worst_case_is_no_better_than_any_attack_of_its_rings():
+    worst = {(each['defence'], each['rings']): each['balanced'] for each in worst_cases(ROWS, 1)}
+    assert worst == {('none', FLIPS): 0.5, ('none', f'{FLIPS}+{NODES}'): 0.25,
+                     ('defences rederive', FLIPS): 1.0,
+                     ('defences rederive', f'{FLIPS}+{NODES}'): 0.5}
+
+
+def test_a_threshold_is_a_defence_of_its_own():
+    assert defence_title({'detector': '', 'threshold': 0.99}) == 'threshold 0.99'
+    assert defence_title({'detector': 'defences x', 'threshold': 0.9}) == (
+        'defences x, threshold 0.9')
+
+
+POSTERS = [{'sequence': 'tour', 'earlier': 1, 'later': 9, 'kind': condition.kind,
+            'share': condition.share, 'count': condition.count, 'control': condition.control,
+            'on_wall': 2, 'target': 'wl', 'check': check, 'declared': True, 'to_poster': at < 2,
+            'elsewhere': True}
+           for condition in conditions_of(PosterConfig())
+           for check in ('none', 'hull') for at in range(3)]
+
+
+def test_the_page_is_of_the_summary_alone(tmp_path):
+    prices = [{'sequence': 'tour', 'defence': 'none', 'decision_us': 9.0, 'more_us': 0.0}]
+    path = write_rings(tmp_path, ROWS, POSTERS, prices)
+    text = path.read_text()
+    summary = json.loads((tmp_path / 'summary.json').read_text())
+    assert rings_page(summary) in text
+    assert '| recall | 50.0 (' in text
+    assert '2 (+1)' in text
+    assert 'replay, unaware' in text
+    assert (tmp_path / 'rings.svg').read_bytes().startswith(b'<?xml')
+
+
+def test_posters_are_counted_by_condition():
+    found = counts(POSTERS)
+    assert len(found) == 2 * len(conditions_of(PosterConfig()))
+    assert all((each['pairs'], each['to_poster'], each['elsewhere']) == (3, 2, 3)
+               for each in found)
+
+
+@pytest.mark.parametrize(('values', 'said'), [
+    ([1], 'settings by name'), ({'shares': 'a'}, 'expected shares'), ({'pairs': 0}, 'pairs'),
+    ({'kinds': 'cloth'}, 'textures of'), ({'checks': {'hull': 3}}, 'checks of the posters'),
+    ({'checks': {'hull': {'moat': 1}}}, 'unknown setting'), ({'walls': 2}, 'unknown setting')])
+def test_wrong_posters_are_refused(tmp_path, values, said):
+    with pytest.raises(ConfigError, match=said):
+        poster_config(values, tmp_path)
+
+
+def test_the_recipe_has_every_defence_beside_one_who_knows_it():
+    cells = load_cells('rings', {})
+    path, recipe = read_recipe('rings')
+    config, checks = poster_config(recipe['posters'], path)
+    assert {cell.search for cell in cells} == {
+        'stepwise', 'recall', 'optimum', 'move_nodes', 'replay'}
+    defences = {dict(cell.detector).get('defences', 'none') for cell in cells}
+    assert defences == {'none', 'rederive', 'length_check', 'geometric_check',
+                        'rederive, length_check, geometric_check'}
+    for named in defences:
+        searches = {cell.search for cell in cells if cell.aware
+                    and dict(cell.detector).get('defences', 'none') == named}
+        assert {'recall', 'move_nodes', 'replay'} <= searches
+    assert any(cell.attack.lengths for cell in cells)
+    assert dict(checks)['check and hull'] == LcdConfig(defences='geometric_check',
+                                                       geometric_hull=0.1)
+    assert {condition.count for condition in conditions_of(config)} == {0, 1, 2}
