@@ -28,6 +28,7 @@ RETRIES = ('never', 'gained', 'set')
 # What makes a map, from the one that believes every closure to the one that leaves out most.
 BACK_ENDS = ('least_squares', 'huber', 'cauchy', 'gnc')
 POSTERS = (NONE, 'cells', 'noise', 'chessboard')
+TIERS, ANCHORS = 'tiers', 'anchors'
 
 ConfigT = TypeVar('ConfigT', bound='Config')
 
@@ -154,7 +155,12 @@ class BuilderConfig(Config):
     fast_threshold: int = setting(
         10, 'FAST threshold of ORB, grey levels.', low=1, high=100)
     feature_neighbours: int = setting(
-        6, 'Nearest features that a feature is joined with (k).', low=0, high=50)
+        6, 'Nearest features that a feature is joined with (k); of the variant tiers.', low=0,
+        high=50)
+    graph_variant: str = setting(
+        TIERS, 'Which nodes are joined. tiers: every two objects, features with their objects and '
+        'with each other. anchors: a node for the whole scene as well, for features outside all '
+        'boxes, and no two features; the target symbio needs it.', choices=(TIERS, ANCHORS))
     detector: str = setting(
         'onnx', 'Where objects come from: the network (onnx), nowhere (none), a file of recorded '
         'detections (csv), or, in the node, the topic detections (topic).',

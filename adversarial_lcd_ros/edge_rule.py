@@ -14,12 +14,13 @@ from scipy.spatial import cKDTree
 
 
 def joined_pairs(position: NDArray[np.float32], size: NDArray[np.float32], objects: int,
-                 neighbours: int) -> NDArray[np.uint32]:
+                 neighbours: int, has_scene: bool = False) -> NDArray[np.uint32]:
     """
     Return the edges of some nodes, sorted, source < target, shape (m, 2).
 
     Every two objects; a feature and every box that holds it, or else the nearest object; a
-    feature and its nearest features.
+    feature and its nearest features. With the whole scene as the last object (the graph variant
+    "anchors"): every two objects; a feature and every other box that holds it, or else the scene.
 
     Parameters
     ----------
@@ -29,28 +30,33 @@ def joined_pairs(position: NDArray[np.float32], size: NDArray[np.float32], objec
         Width and height of the boxes of objects, pixels; of features it is not looked at.
     objects : int
     neighbours : int
-        Nearest features that each feature is joined with.
+        Nearest features that each feature is joined with; none with a scene.
+    has_scene : bool
+        Whether the last object is the scene.
 
     """
     features = position[objects:]
     pairs = np.concatenate([
         np.stack(np.triu_indices(objects, 1), axis=1),
-        _spokes(features, position[:objects], size[:objects]),
-        _neighbour_edges(features, neighbours) + objects])
+        _spokes(features, position[:objects], size[:objects], has_scene),
+        _neighbour_edges(features, 0 if has_scene else neighbours) + objects])
     # As one number each, which sorts several times faster than rows do.
     key = np.unique(pairs[:, 0] * len(position) + pairs[:, 1])
     return np.stack(np.divmod(key, max(len(position), 1)), axis=1).astype(np.uint32)
 
 
 def _spokes(feature: NDArray[np.float32], centre: NDArray[np.float32],
-            size: NDArray[np.float32]) -> NDArray[np.int64]:
+            size: NDArray[np.float32], has_scene: bool) -> NDArray[np.int64]:
     """Return the edges (object, feature), shape (e, 2)."""
     if not len(centre) or not len(feature):
         return np.zeros((0, 2), np.int64)
     inside = np.all(np.abs(feature[:, None] - centre[None]) <= size[None] / 2, axis=2)
-    lost = ~inside.any(axis=1)
-    distance = np.linalg.norm(feature[lost, None] - centre[None], axis=2)
-    inside[lost, distance.argmin(axis=1)] = True
+    if has_scene:
+        inside[:, -1] = ~inside[:, :-1].any(axis=1)
+    else:
+        lost = ~inside.any(axis=1)
+        distance = np.linalg.norm(feature[lost, None] - centre[None], axis=2)
+        inside[lost, distance.argmin(axis=1)] = True
     row, owner = np.nonzero(inside)
     return np.stack([owner, row + len(centre)], axis=1)
 

@@ -16,6 +16,8 @@ from adversarial_lcd_ros.errors import GraphError
 OBJECT_TIER = 0
 FEATURE_TIER = 1
 DESCRIPTOR_BYTES = 32
+# Class of the object that is the whole scene, in graphs that have it: networks count below it.
+SCENE_CLASS = 1 << 16
 
 _NODE_ARRAYS = {
     'tier': (np.uint8, ()),
@@ -167,6 +169,17 @@ class MultiTierGraph:
     def object_count(self) -> int:
         """Number of tier-0 nodes; they are nodes 0 .. object_count - 1."""
         return int(np.searchsorted(self.tier, FEATURE_TIER))
+
+    @property
+    def has_scene(self) -> bool:
+        """Whether the last object is the whole scene (the graph variant "anchors")."""
+        count = self.object_count
+        return count > 0 and int(self.label[count - 1]) == SCENE_CLASS
+
+    @property
+    def found_objects(self) -> int:
+        """Number of objects that a detector has found: all but the scene."""
+        return self.object_count - self.has_scene
 
     @property
     def diagonal(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, MultiTierGraph
+from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, SCENE_CLASS, MultiTierGraph
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.types import LcdAnswer
@@ -90,7 +90,7 @@ def load_for_attacker(config: AttackConfig) -> None:
 
 
 def _graph(stamp_ns: int) -> MultiTierGraph:
-    """Return two objects, and a ring of features of which each sees both, as off the wire."""
+    """Return an object, the scene, and a ring of features that hang on both, as off the wire."""
     feature = np.arange(_OBJECTS, _NODES)
     ring = np.sort(np.stack([feature, np.roll(feature, 1)], axis=1), axis=1)
     seen = np.stack(np.meshgrid(np.arange(_OBJECTS), feature, indexing='ij'), axis=-1)
@@ -98,12 +98,13 @@ def _graph(stamp_ns: int) -> MultiTierGraph:
     edge = edge[np.lexsort((edge[:, 1], edge[:, 0]))].astype(np.uint32)
     descriptor = np.zeros((_NODES, 32), np.uint8)
     descriptor[_OBJECTS:] = _descriptor(len(feature))
+    label = np.zeros(_NODES, np.uint32)
+    label[_OBJECTS - 1] = SCENE_CLASS
     position = np.stack([np.arange(_NODES)] * 2, axis=1).astype(np.float32)
     offset = position[edge[:, 0]] - position[edge[:, 1]]
     return codec.decode_graph(codec.encode_graph(MultiTierGraph(
         stamp_ns=stamp_ns, frame_id='', sequence=0, width=640, height=480,
-        tier=(np.arange(_NODES) >= _OBJECTS).astype(np.uint8), label=np.zeros(_NODES, np.uint32),
-        position=position,
+        tier=(np.arange(_NODES) >= _OBJECTS).astype(np.uint8), label=label, position=position,
         size=np.ones((_NODES, 2), np.float32), score=np.ones(_NODES, np.float32),
         descriptor=descriptor, edge=edge, edge_length=np.hypot(*offset.T) / np.float32(800),
         word=np.zeros(1, np.uint32), word_weight=np.ones(1, np.float32))))

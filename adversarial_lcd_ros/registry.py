@@ -163,6 +163,7 @@ TARGETS = Table('target', 'lcd.targets.base:Target', {
     'objects': 'objects:ObjectsTarget',
     'wl_exact': 'wl_exact:WlExactTarget',
     'gnn': 'gnn:GnnTarget',
+    'symbio': 'symbio:SymbioTarget',
 }, 'targets')
 
 DEFENCES = Table('defence', 'lcd.defences.base:Defence', {

@@ -65,7 +65,7 @@ def test_stages(record, images):
         'objects, one thread': lambda: detector.detect(image),
         'assembly': lambda: assemble(
             features[kept], words[kept], objects, vocabulary.vector(words),
-            CONFIG.feature_neighbours, width=width, height=height, stamp_ns=0,
+            CONFIG, width=width, height=height, stamp_ns=0,
             frame_id='camera', sequence=0)}
     with GraphBuilder(CONFIG) as builder:
         for stage, run in stages.items():

@@ -1,9 +1,12 @@
 """Graphs for tests: small ones to compute by hand, random ones for invariants."""
 
+from dataclasses import replace
+
 from hypothesis import strategies as st
 import numpy as np
 
-from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.graph import SCENE_CLASS, MultiTierGraph
+from adversarial_lcd_ros.registry import TARGETS
 
 
 def make_graph(nodes=6, edges=((0, 1), (0, 2), (1, 3), (2, 4)), objects=2, seed=0, **fields):
@@ -43,3 +46,20 @@ def flips_of(graph, rng, count):
     source, target = np.triu_indices(graph.node_count, 1)
     chosen = rng.choice(len(source), min(count, len(source)), replace=False)
     return np.stack([source[chosen], target[chosen]], axis=1)
+
+
+def with_scene(graph):
+    """Return a graph with one object more, the scene, which is joined with nothing."""
+    if graph.has_scene:
+        return graph
+    count = graph.object_count
+    scene = {'tier': 0, 'label': SCENE_CLASS, 'position': (graph.width / 2, graph.height / 2),
+             'size': (graph.width, graph.height), 'score': 1, 'descriptor': 0}
+    return replace(graph, edge=graph.edge + (graph.edge >= count).astype(np.uint32), **{
+        name: np.insert(getattr(graph, name), count, value, axis=0)
+        for name, value in scene.items()})
+
+
+def suited(target, graph):
+    """Return a graph as a target needs it."""
+    return with_scene(graph) if TARGETS[target].graph_variant else graph

@@ -10,6 +10,7 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
+from adversarial_lcd_ros.graph import SCENE_CLASS
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
 from adversarial_lcd_ros.vision.features import Features
@@ -32,11 +33,12 @@ def objects_at(box):
                       np.linspace(0.9, 0.5, len(box), dtype=np.float32))
 
 
-def assembled(features=(), objects=(), neighbours=0, bow=NO_WORDS):
+def assembled(features=(), objects=(), neighbours=0, bow=NO_WORDS, variant='tiers'):
     features = features_at(features)
     return assemble(features, np.arange(len(features), dtype=np.uint32) + 7, objects_at(objects),
-                    bow, neighbours, width=640, height=480, stamp_ns=5, frame_id='left',
-                    sequence=2)
+                    bow, BuilderConfig(feature_neighbours=neighbours,
+                                       graph_variant=variant),
+                    width=640, height=480, stamp_ns=5, frame_id='left', sequence=2)
 
 
 def edges(graph):
@@ -54,6 +56,23 @@ def test_a_feature_belongs_to_every_box_that_holds_it_or_to_the_nearest():
     spokes = {(a, b) for a, b in edges(graph) if a < 3 <= b}
     # The last one, on the corner of the first box, is in it.
     assert spokes == {(0, 3), (0, 4), (1, 4), (1, 5), (2, 6), (0, 7)}
+
+
+def test_the_scene_takes_what_no_box_holds_and_features_are_not_joined():
+    graph = assembled(features=[(15, 15), (45, 45), (100, 30), (330, 50)], neighbours=3,
+                      objects=[(10, 10, 40, 40), (40, 40, 20, 20)], variant='anchors')
+    assert edges(graph) == {(0, 1), (0, 2), (1, 2), (0, 3), (0, 4), (1, 4), (2, 5), (2, 6)}
+    assert (graph.has_scene, graph.found_objects, graph.object_count) == (True, 2, 3)
+    assert graph.label[:3].tolist() == [50, 51, SCENE_CLASS]
+    assert (graph.position[2].tolist(), graph.size[2].tolist()) == ([320, 240], [640, 480])
+    assert codec.decode_graph(codec.encode_graph(graph)) == graph
+
+
+def test_without_objects_everything_hangs_on_the_scene():
+    graph = assembled(features=[(15, 15), (45, 45)], neighbours=3, variant='anchors')
+    assert edges(graph) == {(0, 1), (0, 2)}
+    assert (graph.has_scene, graph.found_objects) == (True, 0)
+    assert not assembled(features=[(15, 15)]).has_scene
 
 
 def test_a_feature_is_joined_with_its_nearest_and_with_those_it_is_nearest_to():

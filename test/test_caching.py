@@ -5,6 +5,7 @@ import logging
 from pathlib import Path
 import sys
 
+from graph_factory import suited
 import numba
 from numba.core.registry import CPUDispatcher
 import pytest
@@ -119,7 +120,8 @@ def tour():
 
 def run_targets(graphs):
     for target in TARGETS:
-        run_offline(graphs, LcdConfig(target=target, min_gap_s=1.0))
+        run_offline([suited(target, graph) for graph in graphs],
+                    LcdConfig(target=target, min_gap_s=1.0))
 
 
 def run_attacks(graphs):

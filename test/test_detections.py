@@ -76,7 +76,7 @@ def test_rows_are_read_exactly_and_in_order_of_time(tmp_path):
     (line().rsplit(',', 1)[0], 'line 3: 6 fields'),
     (line(label='cup'), 'line 3: invalid literal'),
     (line(label=-1), 'line 3: class -1'),
-    (line(label=2**32), 'line 3: class 4294967296'),
+    (line(label=65536), 'line 3: class 65536; expected 0 to 65535'),
     (line(label=1.5), 'line 3: invalid literal'),
     (line(box=(1, 2, 0, 4)), 'line 3: box'),
     (line(box=('nan', 2, 3, 4)), 'line 3: box'),
@@ -243,6 +243,7 @@ def test_the_message_is_told_from_the_others():
 @pytest.mark.parametrize(('fields', 'said'), [
     ({'score': np.array([0.5, 1.5], np.float32)}, 'score'),
     ({'score': np.array([0.5, np.nan], np.float32)}, 'score'),
+    ({'label': np.array([3, 65536], np.uint32)}, 'class 65536'),
     ({'score': np.zeros(3, np.float32)}, '3 scores'),
     ({'box': np.ones((1, 4), np.float32)}, '4 values of box'),
     ({'box': np.array([[0, 0, 1, 1], [0, 0, 0, 1]], np.float32)}, 'without width'),

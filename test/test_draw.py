@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from graph_factory import make_graph
+from graph_factory import make_graph, with_scene
 import numpy as np
 import pytest
 
@@ -59,6 +59,17 @@ def test_a_picture_has_the_size_that_is_asked_for(scale):
 def test_graphs_without_nodes_and_unknown_classes_are_drawn():
     assert draw_graph(FRAME, make_graph(0, (), 0)).shape == FRAME.shape
     assert draw_graph(FRAME, scene(label=np.full(6, 4_000_000_000, np.uint32))).any()
+
+
+def test_the_scene_is_a_tag_in_the_middle_without_a_box():
+    from adversarial_lcd_ros.vision.draw import _OBJECT
+
+    graph = with_scene(make_graph(5, (), 0, position=PLACES[1:]))
+    of_object = (draw_graph(FRAME, graph, legend=False) == _OBJECT).all(axis=2)
+    y, x = np.nonzero(of_object)
+    assert len(y) > 100
+    assert np.abs(y - 240).max() < 20
+    assert np.abs(x - 320).max() < 60
 
 
 def test_tags_of_boxes_at_one_place_do_not_hide_each_other():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 import shutil
 
-from graph_factory import flips_of, graphs, make_graph
+from graph_factory import flips_of, graphs, make_graph, suited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -48,8 +48,9 @@ def make_detector(request, tmp_path):
         detector = LoopClosureDetector(LcdConfig(
             target=target, model=str(path), min_gap_s=1.0, threshold=0.3, **SETTINGS[name]))
         for second, keyframe in enumerate(keyframes):
-            detector.detect(replace(keyframe, stamp_ns=second * 10**9))
+            detector.detect(replace(suited(target, keyframe), stamp_ns=second * 10**9))
         return detector
+    make.suited = lambda graph: suited(target, graph)
     return make
 
 
@@ -69,7 +70,7 @@ def by_judging(detector, graph, pairs):
 @settings(max_examples=25, deadline=None)
 def all_flips_agree(make_detector, graph, seed, stretched):
     rng = np.random.default_rng(seed)
-    graph = replace(graph, stamp_ns=10**12)
+    graph = make_detector.suited(replace(graph, stamp_ns=10**12))
     others = [graph.flip(flips_of(graph, rng, 4)) for _ in range(3)]
     detector = make_detector([*others, make_graph(9, [(0, 4), (3, 4)], seed=seed)])
     if stretched:
@@ -84,8 +85,8 @@ def test_every_single_flip_is_scored_as_the_detector_judges_it(make_detector):
 
 
 def test_pairs_in_any_order_and_repeated(make_detector):
-    graph = replace(make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3),
-                    stamp_ns=10**12)
+    graph = make_detector.suited(replace(
+        make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3), stamp_ns=10**12))
     detector = make_detector([graph.flip([(3, 4)]), make_graph(20, objects=3)])
     pairs = [(9, 4), (0, 5), (2, 1), (19, 0), (9, 4)]
     assert flip_logits(detector, graph, pairs) == pytest.approx(
@@ -93,8 +94,8 @@ def test_pairs_in_any_order_and_repeated(make_detector):
 
 
 def test_a_scorer_goes_on_with_flipped_graphs(make_detector):
-    graph = replace(make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3),
-                    stamp_ns=10**12)
+    graph = make_detector.suited(replace(
+        make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3), stamp_ns=10**12))
     detector = make_detector([graph.flip([(3, 4)]), make_graph(20, objects=3)])
     scorer = FlipScorer(detector, graph)
     flipped = graph.flip([(0, 5), (1, 12), (7, 8)])
@@ -104,8 +105,8 @@ def test_a_scorer_goes_on_with_flipped_graphs(make_detector):
 
 
 def test_step_after_step_the_scores_are_those_of_a_fresh_scorer(make_detector):
-    graph = replace(make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3),
-                    stamp_ns=10**12)
+    graph = make_detector.suited(replace(
+        make_graph(20, [(k % 3, k) for k in range(5, 20)], objects=3), stamp_ns=10**12))
     detector = make_detector([graph.flip([(3, 4)]), make_graph(20, objects=3)])
     scorer = FlipScorer(detector, graph)
     for pair in [(7, 8), (0, 5), (1, 12), (9, 10), (0, 9)]:
@@ -116,7 +117,8 @@ def test_step_after_step_the_scores_are_those_of_a_fresh_scorer(make_detector):
 
 
 def test_without_a_candidate_no_flip_makes_a_loop(make_detector):
-    assert (flip_logits(make_detector([]), make_graph()) == -np.inf).all()
+    graph = make_detector.suited(make_graph())
+    assert (flip_logits(make_detector([]), graph) == -np.inf).all()
 
 
 @pytest.fixture

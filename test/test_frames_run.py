@@ -1,5 +1,6 @@
 """Experiments: resumed, side by side, and on a cluster that loses a worker."""
 
+from dataclasses import replace
 from functools import partial
 import json
 import os
@@ -50,6 +51,20 @@ def cells(tmp_path):
 @pytest.fixture
 def lcd(lcd_model):
     return lcd_config(lcd_model)
+
+
+def test_cells_meet_graphs_that_their_targets_can_judge(tmp_path, vocabulary, cells, lcd):
+    cells = [replace(cells[0], target=target, asked_target=target, seeds=1)
+             for target in ('wl', 'symbio')]
+    walk = str(walk_folder(tmp_path / 'walk'))
+    streams = [stream for variant in ('', 'anchors') for stream in open_streams(
+        [walk], [NODES], builder_config(vocabulary), LABELS, tmp_path / 'cache', nothing,
+        variant=variant)]
+    tasks = plan_experiment(streams, cells, replace(lcd, model='')).tasks
+    assert [(task.graphs.builder.graph_variant, [cell.target for cell in task.cells])
+            for task in tasks] == [('tiers', ['wl']), ('anchors', ['symbio'])]
+    assert [graph.has_scene for task in tasks
+            for graph in load_stream_graphs(task.graphs)[:1]] == [False, True]
 
 
 def untimed(rows):

@@ -4,7 +4,7 @@ from dataclasses import replace
 import json
 import shutil
 
-from graph_factory import flips_of, graphs, make_graph
+from graph_factory import flips_of, graphs, make_graph, suited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -176,11 +176,12 @@ def test_reuse_between_queries_does_not_change_the_answer(model):
 
 def map_of(model, target):
     """Return a function that makes detectors with the same keyframes: some alike, some not."""
-    graph = make_graph(30, [(k % 4, k) for k in range(5, 30)] + [(k, k + 2) for k in range(28)],
-                       objects=4, seed=5)
+    graph = suited(target, make_graph(
+        30, [(k % 4, k) for k in range(5, 30)] + [(k, k + 2) for k in range(28)], objects=4,
+        seed=5))
     stored = [replace(graph.flip(flips_of(graph, np.random.default_rng(second), 12)),
                       stamp_ns=second * 10**9, sequence=second) for second in range(3)]
-    stored += [at(second, seed=second) for second in (3, 4)]
+    stored += [suited(target, at(second, seed=second)) for second in (3, 4)]
 
     def make():
         detector = LoopClosureDetector(
@@ -326,5 +327,5 @@ def test_the_network_sees_edges_and_a_damaged_one_is_refused(tmp_path):
 @pytest.mark.parametrize('target', list(TARGETS))
 def test_what_ships_belongs_to_its_target(target):
     detector = LoopClosureDetector(LcdConfig(target=target, min_gap_s=1.0))
-    detector.detect(at(0))
-    assert 0 < detector.judge(at(9)).probability <= 1
+    detector.detect(suited(target, at(0)))
+    assert 0 < detector.judge(suited(target, at(9))).probability <= 1

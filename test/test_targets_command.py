@@ -58,6 +58,13 @@ def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
     assert f'| 20 (10 loops), {pairs["distinct_pairs"]} different |' in line
 
 
+def test_each_target_gets_the_graphs_that_it_needs(tmp_path, command):
+    assert command('--targets', 'wl', 'symbio', '--protocols', 'pairs') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
+    sizes = {row['target']: row['nodes_mean'] for row in rows}
+    assert sizes['symbio'] == sizes['wl'] + 1  # no objects here, but the scene
+
+
 def test_rows_that_are_there_are_not_made_again(tmp_path, command, capsys):
     assert command('--targets', 'vbow') == 0
     before = (tmp_path / 'out' / 'cells.jsonl').read_bytes()

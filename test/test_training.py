@@ -27,7 +27,8 @@ from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 LAP, PERIOD_NS = 20, 500_000_000
 PLAN = TrainingPlan(BuilderConfig(detector='none', features=60, detected_features=200),
-                    targets=('wl', 'vbow'), pairs=40, branching=4, depth=2, flips_per_frame=2)
+                    targets=('wl', 'vbow', 'symbio'), pairs=40, branching=4, depth=2,
+                    flips_per_frame=2)
 
 
 def view(place, lap):
@@ -64,12 +65,15 @@ def trained(tour, tmp_path_factory):
 
 def test_all_artefacts_are_there_and_load(trained):
     output, card = trained
-    made = {'vocabulary.npz', 'target_wl.json', 'target_vbow.json', 'surrogate_data.npz'}
+    made = {'vocabulary.npz', 'target_wl.json', 'target_vbow.json', 'target_symbio.json',
+            'surrogate_data.npz'}
     assert {path.name for path in output.iterdir()} == made | {'MODEL_CARD.json'}
     assert set(card['files']) == made
     assert [path.name for path in output.parent.iterdir()] == ['models']
     assert len(Vocabulary.load(output / 'vocabulary.npz').idf) == 16
-    for target in ('wl', 'vbow'):
+    variants = [card['targets'][target]['graph_variant'] for target in PLAN.targets]
+    assert variants == ['tiers', 'tiers', 'anchors']
+    for target in PLAN.targets:
         LoopClosureDetector(LcdConfig(target=target, model=str(output / f'target_{target}.json')))
     assert len(SurrogateData.load(output / 'surrogate_data.npz').gain) == card[
         'surrogate_data']['flips'] > 0

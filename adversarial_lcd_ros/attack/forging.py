@@ -71,7 +71,8 @@ def with_positions(graph: MultiTierGraph, position: NDArray[np.float32],
     none: NDArray[np.uint32] = np.zeros((0, 2), np.uint32)
     moved = replace(graph, position=position, edge=none,
                     edge_length=np.zeros(0, np.float32))
-    edge = joined_pairs(moved.position, moved.size, moved.object_count, neighbours)
+    edge = joined_pairs(moved.position, moved.size, moved.object_count, neighbours,
+                        moved.has_scene)
     return moved.with_edges(edge, moved.length_between(edge))
 
 
@@ -119,6 +120,7 @@ def _changed_nodes(one: MultiTierGraph, other: MultiTierGraph) -> int:
 
 
 def _unexplained(graph: MultiTierGraph, neighbours: int) -> int:
-    edge = joined_pairs(graph.position, graph.size, graph.object_count, neighbours)
+    edge = joined_pairs(graph.position, graph.size, graph.object_count, neighbours,
+                        graph.has_scene)
     key = edge.astype(np.int64) @ (graph.node_count, 1)
     return len(np.setxor1d(graph.edge_key, key, assume_unique=True))

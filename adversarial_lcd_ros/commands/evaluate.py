@@ -158,10 +158,11 @@ def _plan(options: Namespace) -> Plan:
 
     from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan
+    from adversarial_lcd_ros.lcd.targets import builder_for
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
-    return Plan(config_from_options(options, BuilderConfig),
-                config_from_options(options, LcdConfig),
+    lcd = config_from_options(options, LcdConfig)
+    return Plan(builder_for(config_from_options(options, BuilderConfig), lcd.target), lcd,
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),

@@ -83,7 +83,7 @@ def run(options: Namespace) -> None:
              for cell in load_cells(options.recipe, _overrides(options), options.only or ())]
     folder = _folder(options)
     with open_store(folder) as store:
-        streams = _open(options, sorted({cell.nodes for cell in cells}))
+        streams = _open(options, cells)
         experiment = plan_experiment(streams, cells, lcd, list(store.rows))
         _write_setup(folder, options, streams, [asdict(cell) for cell in cells])
         _announce(options, streams, experiment, len(store.rows) - experiment.finished)
@@ -171,15 +171,21 @@ def _folder(options: Namespace) -> Path:
     return output / Path(options.recipe).stem if output == Path('results') else output
 
 
-def _open(options: Namespace, nodes: list[int]) -> list[Stream]:
+def _open(options: Namespace, cells: list[Cell]) -> list[Stream]:
     from adversarial_lcd_ros.evaluation.frames.recipe import load_labels
     from adversarial_lcd_ros.evaluation.streams import open_streams
 
+    builder = config_from_options(options, BuilderConfig)
+    labels = config_from_options(options, LabelConfig)
+    streams: list[Stream] = []
     with progress_bar('graphs') as progress:
-        return open_streams(options.sources, nodes, config_from_options(options, BuilderConfig),
-                            config_from_options(options, LabelConfig), options.cache,
-                            lambda source, done, total: progress(done, total),
-                            load_labels(options.recipe, chosen_settings(options, LabelConfig)))
+        for variant in dict.fromkeys(cell.variant_needed for cell in cells):
+            nodes = sorted({cell.nodes for cell in cells if cell.variant_needed == variant})
+            streams += open_streams(
+                options.sources, nodes, builder, labels, options.cache,
+                lambda source, done, total: progress(done, total),
+                load_labels(options.recipe, chosen_settings(options, LabelConfig)), variant)
+    return streams
 
 
 def _write_setup(folder: Path, options: Namespace, streams: list[Stream],

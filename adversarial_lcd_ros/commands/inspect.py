@@ -149,6 +149,7 @@ def _show_payload(name: str, content: Any) -> None:
         return
     number = f' {content.id}' if graph is not content else ''
     console.print(f'{name}{number}: n = {graph.node_count}, m = {graph.edge_count}, '
-                  f'{graph.object_count} objects, {graph.width} x {graph.height} pixels, '
+                  f'{graph.found_objects} objects{" and the scene" if graph.has_scene else ""}, '
+                  f'{graph.width} x {graph.height} pixels, '
                   f'sequence {graph.sequence}, stamp {graph.stamp_ns} ns, frame '
                   f'{graph.frame_id!r}', soft_wrap=True)

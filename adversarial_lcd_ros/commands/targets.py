@@ -138,17 +138,21 @@ def _sequences(options: Namespace) -> list[TargetSequence]:
 
 def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTask]:
     from adversarial_lcd_ros.evaluation.detectors.run import TargetTask
+    from adversarial_lcd_ros.lcd.targets import needed_variant
 
     seeds = tuple(range(options.seed, options.seed + options.draws))
     return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds,
                        sequence.scored, sequence.labels)
-            for sequence in sequences for stream in _streams(sequence, options.cache)
-            for protocol in options.protocols for target in sequence.targets]
+            for sequence in sequences
+            for variant in dict.fromkeys(map(needed_variant, sequence.targets))
+            for stream in _streams(sequence, options.cache, variant)
+            for protocol in options.protocols for target in sequence.targets
+            if needed_variant(target) == variant]
 
 
-def _streams(sequence: TargetSequence, cache: Path | None) -> list[Stream]:
+def _streams(sequence: TargetSequence, cache: Path | None, variant: str) -> list[Stream]:
     from adversarial_lcd_ros.evaluation.streams import open_streams
 
     with progress_bar(f'graphs of {Path(sequence.source).name}') as progress:
         return open_streams([sequence.source], sequence.nodes, sequence.builder, sequence.labels,
-                            cache, lambda _, done, total: progress(done, total))
+                            cache, lambda _, done, total: progress(done, total), variant=variant)

@@ -61,6 +61,8 @@ class Stream:
     labels : FrameLabels
     digest : str
         Of graphs and labels, hexadecimal.
+    variant : str
+        That its targets need; '': they take any.
 
     """
 
@@ -70,6 +72,7 @@ class Stream:
     graphs: GraphSource
     labels: FrameLabels
     digest: str
+    variant: str = ''
 
     @cached_property
     def pairs_digest(self) -> str:
@@ -80,7 +83,8 @@ class Stream:
 def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,
                  config: LabelConfig, cache: Path | None,
                  progress: Callable[[str, int, int], None],
-                 own_labels: Mapping[str, LabelConfig] | None = None) -> list[Stream]:
+                 own_labels: Mapping[str, LabelConfig] | None = None, variant: str = ''
+                 ) -> list[Stream]:
     """
     Open, and where needed build, the graphs of every sequence and size; label the frames.
 
@@ -100,6 +104,8 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
         Called with the source, frames done and frames in all.
     own_labels : mapping, optional
         Settings of labels in place of ``config``, by name of the sequence.
+    variant : str
+        That the targets need, whatever the settings of the graphs say; '': they take any.
 
     Raises
     ------
@@ -111,7 +117,8 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
     streams: list[Stream] = []
     for source in sources:
         taken = {stream.name for stream in streams}
-        settings = _for_source(source, builder)
+        settings = _for_source(source, replace(
+            builder, graph_variant=variant or builder.graph_variant))
         labels: FrameLabels | None = None
         for size in nodes:
             sized = replace(settings, features=size)
@@ -126,7 +133,7 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
             counts = [graph.node_count for graph in sequence.graphs]
             streams.append(Stream(sequence.name, size, sum(counts) / len(counts),
                                   GraphSource(source, sized, cache, digest), labels,
-                                  _with_labels(digest, labels)))
+                                  _with_labels(digest, labels), variant))
     return streams
 
 

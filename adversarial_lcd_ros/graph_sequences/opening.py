@@ -204,7 +204,7 @@ def _converted(labels: Path, sequence: Sequence) -> Path:
 
 
 def _warn_without_objects(name: str, graphs: list[MultiTierGraph], config: BuilderConfig) -> None:
-    if config.detector != 'none' and not any(graph.object_count for graph in graphs):
+    if config.detector != 'none' and not any(graph.found_objects for graph in graphs):
         _log.warning('%s: the detector "%s" found no object in any of %d frames; look at the '
                      'settings model, object_score and min_object_area, or choose another '
                      'detector', name, config.detector, len(graphs))

@@ -23,7 +23,13 @@ from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.decision import Decision, probability
 from adversarial_lcd_ros.lcd.defences import Defence, make_defences
-from adversarial_lcd_ros.lcd.targets import Scores, Target, decision_path, make_target
+from adversarial_lcd_ros.lcd.targets import (
+    Scores,
+    Target,
+    check_variant,
+    decision_path,
+    make_target,
+)
 from adversarial_lcd_ros.lcd.views import Comparison, Feels, View
 from adversarial_lcd_ros.messages.types import MAX_LOGIT, log_odds
 
@@ -82,7 +88,16 @@ class Scoring:
         return View(self.prepare(graph), same_nodes)
 
     def prepare(self, graph: MultiTierGraph) -> MultiTierGraph:
-        """Return the graph that is judged in place of one received."""
+        """
+        Return the graph that is judged in place of one received.
+
+        Raises
+        ------
+        GraphError
+            It is of another variant than the target needs.
+
+        """
+        check_variant(self.target, graph)
         return prepared(graph, self.defences)
 
     def compare(self, query: View, references: Sequence[View]) -> Compared:

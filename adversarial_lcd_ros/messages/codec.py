@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import MessageLimits
 from adversarial_lcd_ros.errors import CodecError, GraphError
-from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, MultiTierGraph
+from adversarial_lcd_ros.graph import (
+    DESCRIPTOR_BYTES,
+    FEATURE_TIER,
+    SCENE_CLASS,
+    MultiTierGraph,
+)
 from adversarial_lcd_ros.messages.checks import (
     check_decision,
     check_graph,
@@ -272,5 +277,8 @@ def decode_detections(payload: bytes | bytearray | memoryview,
         raise CodecError('box that is not finite, or without width or height', cause='box')
     if not ((message.score >= 0) & (message.score <= 1)).all():
         raise CodecError('score: expected 0 to 1', cause='score')
+    if count and message.label.max() >= SCENE_CLASS:
+        raise CodecError(f'class {int(message.label.max())}: expected 0 to {SCENE_CLASS - 1}',
+                         cause='label')
     return FrameDetections(_stamp_ns(message.header.stamp), _frame_id(message),
                            message.label, box, message.score)

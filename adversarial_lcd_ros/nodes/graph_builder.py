@@ -176,7 +176,7 @@ class GraphBuilderNode(PipelineNode):
 
     def _look_for_objects(self, graph: MultiTierGraph) -> None:
         """Warn if the detector has never found anything, in frames enough to be suspicious."""
-        if graph.object_count or not self._looks_for_objects:
+        if graph.found_objects or not self._looks_for_objects:
             self._looks_for_objects = False
             return
         self.diagnostics.count('graphs without objects')

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.files.text import read_text
+from adversarial_lcd_ros.graph import SCENE_CLASS
 from adversarial_lcd_ros.poses.trajectory import parse_stamp_ns
 
 DETECTIONS_FILE = 'detections.csv'
 COLUMNS = ('timestamp', 'class', 'x', 'y', 'w', 'h', 'score')
 # What published files call the class.
 _CLASS_COLUMNS = ('class', 'coco_class')
-MAX_CLASS = 2**32 - 1
+MAX_CLASS = SCENE_CLASS - 1
 
 
 @dataclass(frozen=True, eq=False)

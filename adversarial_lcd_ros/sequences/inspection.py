@@ -47,7 +47,7 @@ class GraphSizes:
     @classmethod
     def of(cls, graphs: Iterable[MultiTierGraph]) -> GraphSizes:
         """Return the statistics of at least one graph; none of them is kept."""
-        sizes = np.array([(graph.node_count, graph.edge_count, graph.object_count)
+        sizes = np.array([(graph.node_count, graph.edge_count, graph.found_objects)
                           for graph in graphs], np.float64)
         spans = np.stack([sizes.min(0), sizes.mean(0), sizes.max(0)], axis=1).tolist()
         return cls(*(tuple(span) for span in spans))
@@ -177,8 +177,8 @@ def payload_values(content: Any) -> dict[str, Any]:
     """Return what a payload says, ready for JSON; of a graph its sizes, of descriptors nothing."""
     if isinstance(content, MultiTierGraph):
         return {'nodes': content.node_count, 'edges': content.edge_count,
-                'objects': content.object_count, 'width': content.width,
-                'height': content.height, 'sequence': content.sequence,
+                'objects': content.found_objects, 'has_scene': content.has_scene,
+                'width': content.width, 'height': content.height, 'sequence': content.sequence,
                 'stamp_ns': content.stamp_ns, 'frame_id': content.frame_id}
     values = {entry.name: getattr(content, entry.name) for entry in fields(content)}
     return {name: payload_values(value) if isinstance(value, MultiTierGraph)

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.training.sources import TrainingFrames
 
 def sequence_card(source: TrainingFrames, sequence: TrainingSequence) -> dict[str, Any]:
     """Return which frames of a sequence were trained on, on what terms, and their graphs."""
-    sizes = np.array([(graph.node_count, graph.edge_count, graph.object_count)
+    sizes = np.array([(graph.node_count, graph.edge_count, graph.found_objects)
                       for graph in sequence.graphs], np.float64).mean(axis=0)
     nodes, edges, objects = (float(size) for size in sizes)
     return {'name': source.sequence.name, 'part': [source.source.start, source.source.stop],

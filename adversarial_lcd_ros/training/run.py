@@ -8,7 +8,7 @@ see glancing revisits, and short sequences have few late ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.files.writing import write_json
+from adversarial_lcd_ros.lcd.targets import needed_variant
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
 from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.sequences.part import SequencePart
@@ -172,8 +173,10 @@ def train(sources: Sequence[SequencePart], output: Path, *, seed: int = 42,
         opened = _open_all(sources, licences, plan)
         vocabulary = _write_vocabulary(opened, plan, seed, work / VOCABULARY, stage)
         builder = replace(plan.builder, vocabulary=str(work / VOCABULARY))
-        sequences = [_build_graphs(source, builder, stage) for source in opened]
-        targets = _write_decisions(sequences, plan, seed, work, stage)
+        graphs = {variant: [_build_graphs(source, builder, variant, stage) for source in opened]
+                  for variant in dict.fromkeys(map(needed_variant, plan.targets))}
+        sequences = graphs[needed_variant(plan.targets[0])]
+        targets = _write_decisions(graphs, plan, seed, work, stage)
         surrogate = _write_surrogate_data(sequences[0], plan, seed, work, stage)
         card = {
             'format': FORMAT, 'seed': seed, 'command_line': list(command_line),
@@ -230,8 +233,9 @@ def _write_vocabulary(opened: Sequence[TrainingFrames], plan: TrainingPlan, seed
             'descriptors': sum(map(len, descriptors))}
 
 
-def _build_graphs(source: TrainingFrames, config: BuilderConfig, stage: Stage
+def _build_graphs(source: TrainingFrames, config: BuilderConfig, variant: str, stage: Stage
                   ) -> TrainingSequence:
+    config = replace(config, graph_variant=variant or config.graph_variant)
     with stage(f'graphs of {source.sequence.name}') as progress, GraphBuilder(config) as builder:
         graphs = [builder.build(frame.image(), frame.stamp_ns, sequence=number)
                   for number, frame in zip(source.numbers, _counted(
@@ -240,17 +244,18 @@ def _build_graphs(source: TrainingFrames, config: BuilderConfig, stage: Stage
                             source.source.path)
 
 
-def _write_decisions(sequences: Sequence[TrainingSequence], plan: TrainingPlan, seed: int,
-                     work: Path, stage: Stage) -> dict[str, Any]:
+def _write_decisions(graphs: Mapping[str, Sequence[TrainingSequence]], plan: TrainingPlan,
+                     seed: int, work: Path, stage: Stage) -> dict[str, Any]:
     card = {}
     for target in plan.targets:
         name = TARGETS.find(target).name
         with stage(f'decision of {target}') as progress:
-            decision = train_decision(target, sequences, lcd=plan.lcd, labels=plan.labels,
-                                      pairs=plan.pairs, seed=seed, progress=progress,
-                                      network=work / network_file(name))
+            decision = train_decision(target, graphs[needed_variant(target)], lcd=plan.lcd,
+                                      labels=plan.labels, pairs=plan.pairs, seed=seed,
+                                      progress=progress, network=work / network_file(name))
         decision.save(work / decision_file(name))
-        card[target] = decision_card(decision)
+        card[target] = {**decision_card(decision), 'graph_variant':
+                        needed_variant(target) or plan.builder.graph_variant}
     return card
 
 

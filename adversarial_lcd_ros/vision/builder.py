@@ -10,10 +10,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import BuilderConfig
+from adversarial_lcd_ros.config import ANCHORS, BuilderConfig
 from adversarial_lcd_ros.edge_rule import joined_pairs
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.graph import DESCRIPTOR_BYTES, FEATURE_TIER, OBJECT_TIER, MultiTierGraph
+from adversarial_lcd_ros.graph import (
+    DESCRIPTOR_BYTES,
+    FEATURE_TIER,
+    OBJECT_TIER,
+    SCENE_CLASS,
+    MultiTierGraph,
+)
 from adversarial_lcd_ros.paths import model_path, object_model_path
 from adversarial_lcd_ros.sequences.detections import DetectionTable, read_detections
 from adversarial_lcd_ros.vision.detections import class_words, given_objects, recorded_objects
@@ -135,8 +141,8 @@ class GraphBuilder:
         kept = spread(features, self.config.features, width, height)
         return Building(coming, lambda objects: assemble(
             features[kept], words[kept], self._anchors(objects, width, height),
-            self._vocabulary.vector(words), self.config.feature_neighbours, width=width,
-            height=height, stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence))
+            self._vocabulary.vector(words), self.config, width=width, height=height,
+            stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence))
 
     def build_objects(self, stamp_ns: int, width: int, height: int, frame_id: str = 'camera',
                       sequence: int = 0) -> MultiTierGraph:
@@ -157,7 +163,7 @@ class GraphBuilder:
                               'expected "csv", which reads its recorded detections')
         objects = self._anchors(self._detected(stamp_ns), width, height)
         return assemble(Features.none(), np.zeros(0, np.uint32), objects,
-                        class_words(objects.label), 0, width=width, height=height,
+                        class_words(objects.label), self.config, width=width, height=height,
                         stamp_ns=stamp_ns, frame_id=frame_id, sequence=sequence)
 
     def _detect(self, image: NDArray[np.uint8], stamp_ns: int) -> Detections:
@@ -207,12 +213,14 @@ def _recorded(config: BuilderConfig) -> DetectionTable | None:
 
 
 def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
-             bow: tuple[NDArray[np.uint32], NDArray[np.float32]], neighbours: int, *, width: int,
-             height: int, stamp_ns: int, frame_id: str, sequence: int) -> MultiTierGraph:
+             bow: tuple[NDArray[np.uint32], NDArray[np.float32]], config: BuilderConfig, *,
+             width: int, height: int, stamp_ns: int, frame_id: str, sequence: int
+             ) -> MultiTierGraph:
     """
     Return the multi-tier graph of features and objects.
 
-    Edges by ``edge_rule.joined_pairs``; lengths are distances over the image diagonal.
+    Edges by ``edge_rule.joined_pairs``; lengths are distances over the image diagonal. In the
+    variant 'anchors' one object more, the last, is the whole scene.
 
     Parameters
     ----------
@@ -222,17 +230,20 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
     objects : Detections
     bow : (uint32, float32)
         Words of the whole frame and their weights.
-    neighbours : int
-        Nearest features that each feature is joined with.
+    config : BuilderConfig
+        Its variant and neighbours.
     width, height, stamp_ns, frame_id, sequence
         Of the frame.
 
     """
+    has_scene = config.graph_variant == ANCHORS
+    if has_scene:
+        objects = _with_scene(objects, width, height)
     first = len(objects)
     centre = objects.box[:, :2] + objects.box[:, 2:] / 2
     position = np.concatenate([centre, features.position]).astype(np.float32)
     size = np.concatenate([objects.box[:, 2:], np.repeat(features.size[:, None], 2, axis=1)])
-    edge = joined_pairs(position, size, first, neighbours)
+    edge = joined_pairs(position, size, first, config.feature_neighbours, has_scene=has_scene)
     diagonal = np.float32(np.hypot(width, height))
     offset = position[edge[:, 0]] - position[edge[:, 1]]
     return MultiTierGraph(
@@ -247,3 +258,10 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
         edge=edge,
         edge_length=(np.hypot(offset[:, 0], offset[:, 1]) / diagonal).astype(np.float32),
         word=bow[0], word_weight=bow[1])
+
+
+def _with_scene(objects: Detections, width: int, height: int) -> Detections:
+    """Return the objects and, last, one of a class of its own that is the whole image."""
+    return Detections(np.r_[objects.label, np.uint32(SCENE_CLASS)],
+                      np.r_[objects.box, np.array([[0, 0, width, height]], np.float32)],
+                      np.r_[objects.score, np.float32(1)])

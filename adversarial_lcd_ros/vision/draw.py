@@ -41,7 +41,8 @@ def draw_graph(image: NDArray[np.uint8], graph: MultiTierGraph, flips: ArrayLike
     """
     Return the frame with a graph over it, BGR.
 
-    Objects are boxes with their class, features dots, edges thin and pale. Of the flipped
+    Objects are boxes with their class, the whole scene is a tag in the middle, where its edges
+    meet; features are dots, edges thin and pale. Of the flipped
     pairs, those that are edges of the graph were added (solid red), the others deleted (dashed
     red).
 
@@ -254,16 +255,20 @@ def _dashes(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[
 
 def _draw_objects(canvas: NDArray[np.uint8], graph: MultiTierGraph, classes: Sequence[str],
                   scale: float) -> None:
-    """Draw boxes and, over them, the class names, none on another."""
-    count = graph.object_count
+    """Draw boxes and, over them, the class names, none on another; the scene without a box."""
+    count = graph.found_objects
     half = graph.size[:count] / 2
     corners = np.rint(scale * np.hstack([graph.position[:count] - half,
                                          graph.position[:count] + half])).astype(int).tolist()
     for left, top, right, bottom in corners:
         cv2.rectangle(canvas, (left, top), (right, bottom), _OBJECT, 1, cv2.LINE_AA)
+    names = [classes[label] if label < len(classes) else f'class {label}'
+             for label in graph.label[:count].tolist()]
+    if graph.has_scene:
+        names.append('scene')
+        corners.append(np.rint(scale * graph.position[count]).astype(int).tolist() * 2)
     taken: list[tuple[int, int, int]] = []
-    for label, (left, top, _, _) in zip(graph.label[:count].tolist(), corners, strict=True):
-        name = classes[label] if label < len(classes) else f'class {label}'
+    for name, (left, top, _, _) in zip(names, corners, strict=True):
         width = cv2.getTextSize(name, _FONT, 0.4, 1)[0][0] + 6
         # Inside the frame, also where the box begins above it.
         x = max(0, min(left, canvas.shape[1] - width))
@@ -279,7 +284,8 @@ def _draw_objects(canvas: NDArray[np.uint8], graph: MultiTierGraph, classes: Seq
 def _draw_legend(canvas: NDArray[np.uint8], graph: MultiTierGraph,
                  is_added: NDArray[np.bool_] | None) -> None:
     """Explain colours, with counts, in a line at the bottom."""
-    entries = [('box', _OBJECT, f'{graph.object_count} objects'),
+    scene = ' and the scene' if graph.has_scene else ''
+    entries = [('box', _OBJECT, f'{graph.found_objects} objects{scene}'),
                ('dot', _FEATURE, f'{graph.node_count - graph.object_count} features'),
                ('line', _FEATURE_EDGE, f'{graph.edge_count} edges')]
     if is_added is not None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.graph import SCENE_CLASS
+
 # Heads of YOLO up to version 7: boxes of a cell, and the cells' sizes, pixels.
 _ANCHORS = 3
 _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (16, 32))
@@ -12,7 +14,7 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (16, 32))
 _TOLERANCE = 0.01
 # The largest number of a box whose sides are shares of the image; no object is so few pixels.
 _MAX_SHARE = 1.5
-_MAX_CLASSES = 1 << 16
+_MAX_CLASSES = SCENE_CLASS
 
 
 def is_grid(rows: int | str, size: tuple[int, int]) -> bool:

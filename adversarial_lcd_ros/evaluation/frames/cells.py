@@ -21,7 +21,7 @@ from adversarial_lcd_ros.environment import code_digest, named_code_digest
 from adversarial_lcd_ros.evaluation.digests import file_digest
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, attack_columns, method_of
 from adversarial_lcd_ros.files.digests import digest_of
-from adversarial_lcd_ros.lcd.targets import decision_path
+from adversarial_lcd_ros.lcd.targets import decision_path, needed_variant
 from adversarial_lcd_ros.registry import YARDSTICKS
 
 # Of the row's columns; a change in the code below runs cells again by itself.
@@ -95,6 +95,11 @@ class Cell:
     def method(self) -> str:
         """What chooses the flips: a perturbation, or else a search."""
         return method_of(self._columns)
+
+    @property
+    def variant_needed(self) -> str:
+        """Variant of graphs that one of its targets needs; '' if they take any."""
+        return needed_variant(self.target, self.asked_target)
 
     @property
     def _columns(self) -> dict[str, str]:

@@ -58,7 +58,7 @@ def attacked_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Se
         Most pictures.
 
     """
-    stream_of = {(stream.name, stream.nodes): stream for stream in streams}
+    stream_of = {(stream.name, stream.nodes, stream.variant): stream for stream in streams}
     cell_of = {repr(cell.settings): cell for cell in cells}
     attacks: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
@@ -66,8 +66,9 @@ def attacked_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Se
     strongest = _strongest(attacks)
     pictures = []
     for row, frame in _choose(attacks.get(strongest, ()), count):
-        stream = stream_of[row['sequence'], row['nodes']]
-        result = _again(stream, cell_of[strongest], row, frame, lcd)
+        cell = cell_of[strongest]
+        stream = stream_of[row['sequence'], row['nodes'], cell.variant_needed]
+        result = _again(stream, cell, row, frame, lcd)
         if result is not None:
             pictures.append(_picture(stream, row, frame, result))
     return pictures

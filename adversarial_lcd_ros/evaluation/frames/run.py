@@ -131,7 +131,8 @@ def plan_experiment(streams: Sequence[Stream], cells: Sequence[Cell], lcd: LcdCo
     for seed in range(first_seed, first_seed + max(cell.seeds for cell in cells)):
         for stream in sorted(streams, key=lambda stream: stream.nodes):
             here = [cell for cell in cells
-                    if cell.nodes == stream.nodes and seed < first_seed + cell.seeds]
+                    if (cell.nodes, cell.variant_needed) == (stream.nodes, stream.variant)
+                    and seed < first_seed + cell.seeds]
             named = [(cell_key(cell, seed, stream.pairs_digest if cell.judged == 'pairs'
                                else stream.digest, lcd), cell) for cell in here]
             keys += [key for key, _ in named]

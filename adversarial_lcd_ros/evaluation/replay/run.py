@@ -66,7 +66,9 @@ from adversarial_lcd_ros.graph_sequences.opening import (
 )
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels, unlabelled
+from adversarial_lcd_ros.lcd.targets import check_variant
 from adversarial_lcd_ros.paths import target_path
+from adversarial_lcd_ros.registry import TARGETS
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
@@ -143,6 +145,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
             raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
         tell('no ground truth: decisions that change are counted, none can be scored')
     target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
+    if isinstance(sequence, GraphSequence):
+        check_variant(TARGETS.find(plan.lcd.target), sequence.graphs[0])
     # Whether the nodes still live is watched here: the replay waits for them without a limit.
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1, start_timeout_s=0.0))
     digest = plan_digest(bag, {'builder': plan.builder, 'lcd': plan.lcd, 'replay': plan.replay,

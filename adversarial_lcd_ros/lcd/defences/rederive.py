@@ -31,7 +31,7 @@ class RederiveCheck(Defence):
 
     def _edges(self, graph: MultiTierGraph) -> NDArray[np.uint32]:
         return joined_pairs(graph.position, graph.size, graph.object_count,
-                            self.config.rederive_neighbours)
+                            self.config.rederive_neighbours, graph.has_scene)
 
 
 class Rederive(RederiveCheck):

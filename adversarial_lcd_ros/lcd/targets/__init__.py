@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+from adversarial_lcd_ros.config import ANCHORS, BuilderConfig
+from adversarial_lcd_ros.errors import GraphError
+from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.targets.base import Scores, Target
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.registry import TARGETS
 
-__all__ = ['TARGETS', 'Scores', 'Target', 'decision_path', 'make_target']
+__all__ = ['TARGETS', 'Scores', 'Target', 'builder_for', 'check_variant', 'decision_path',
+           'make_target', 'needed_variant']
 
 
 def make_target(name: str, network: Path | None = None) -> Target:
@@ -47,3 +52,30 @@ def decision_path(model: str, name: str) -> Path:
 
     """
     return target_path(model, TARGETS.find(name).name)
+
+
+def needed_variant(*names: str) -> str:
+    """Return the variant of graphs that one of some targets needs; '' if they take any."""
+    variants: list[str] = [TARGETS.find(name).graph_variant for name in names]
+    return next(filter(None, variants), '')
+
+
+def builder_for(config: BuilderConfig, *names: str) -> BuilderConfig:
+    """Return the settings of graphs for some targets: what these need wins over ``config``."""
+    return replace(config, graph_variant=needed_variant(*names) or config.graph_variant)
+
+
+def check_variant(target: Target | type[Target], graph: MultiTierGraph) -> None:
+    """
+    Hold a graph against what a target needs.
+
+    Raises
+    ------
+    GraphError
+        It is of another variant.
+
+    """
+    if target.graph_variant == ANCHORS and not graph.has_scene:
+        raise GraphError(
+            f'target {target.name} needs graphs with a node for the scene, found one without: '
+            f'build them with "graph_variant" set to "{ANCHORS}"', cause='graph variant')

@@ -36,6 +36,8 @@ class Target(ABC):
         Names of the scores that ``compare`` returns, each at least 0, higher for more alike.
     feels : Feels
         Flips that can change a score.
+    graph_variant : str
+        Variant of graphs (BuilderConfig) that it needs; '': it takes any.
     flip_channels : tuple of FlipChannel classes
         What scores all single flips at once, one for each channel; without, flips are made and
         judged one by one.
@@ -55,6 +57,7 @@ class Target(ABC):
     name: ClassVar[str]
     channels: ClassVar[tuple[str, ...]]
     feels: ClassVar[Feels] = Feels.EVERY
+    graph_variant: ClassVar[str] = ''
     flip_channels: ClassVar[Sequence[type[FlipChannel]]] = ()
     bounds: ClassVar[Sequence[type[Bound]]] = ()
     trainer: ClassVar[str] = ''
