@@ -145,8 +145,7 @@ def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:
     attack = {name: value for name, value in asdict(cell.attack).items()
               if name not in ('seed', *_FILES)}
     values = {'schema': SCHEMA, 'stream': stream, 'seed': seed, 'frames': cell.frames,
-              'detector': detector, 'attack': attack,
-              **{name: value for name, value in cell.settings.items() if name not in detector},
+              'attack': attack, **cell.settings, 'detector': detector,
               'code': [code_digest(*_CODE), *_own_code(cell, lcd)],
               'files': [file_digest(path) for path in _files(cell, lcd)]}
     return digest_of(json.dumps(values, sort_keys=True).encode())
