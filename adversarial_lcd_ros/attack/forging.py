@@ -103,7 +103,8 @@ def among_nearest(graph: MultiTierGraph, pairs: NDArray[np.int64], neighbours: i
         Nearest features that each would be joined with.
 
     """
-    edge = joined_pairs(graph.position, graph.size, graph.object_count, neighbours)
+    edge = joined_pairs(graph.position, graph.size, graph.object_count, neighbours,
+                        graph.has_scene)
     key = edge.astype(np.int64) @ (graph.node_count, 1)
     near: NDArray[np.bool_] = np.isin(pairs @ (graph.node_count, 1), key)
     return near & (pairs[:, 0] >= graph.object_count)
