@@ -3,7 +3,7 @@
 from dataclasses import replace
 from itertools import combinations
 
-from graph_factory import flips_of, graphs, make_graph
+from graph_factory import flips_of, graphs, make_graph, suited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -23,7 +23,7 @@ SLACK = 1e-4
 
 
 @pytest.fixture(params=['edges', 'wl', 'edges, length check', 'wl, geometric check',
-                        'edges, a weight below 0', 'wl, rederive', 'vbow'])
+                        'edges, a weight below 0', 'wl, rederive', 'vbow', 'symbio'])
 def make_detector(request, tmp_path):
     """Return a function that makes a detector with given keyframes, one a second."""
     target = request.param.partition(',')[0]
@@ -43,6 +43,7 @@ def make_detector(request, tmp_path):
         for second, keyframe in enumerate(keyframes):
             detector.remember(replace(keyframe, stamp_ns=second * 10**9))
         return detector
+    make.target = target
     return make
 
 
@@ -62,7 +63,7 @@ def seen(graph, seed):
 @given(graphs(min_nodes=2, max_nodes=12), st.integers(0, 2**16))
 @settings(max_examples=40, deadline=None)
 def no_flips_leave_the_bounds(make_detector, graph, seed):
-    graph, keyframes = seen(graph, seed)
+    graph, keyframes = seen(suited(make_detector.target, graph), seed)
     detector = make_detector(keyframes)
     found = certify(detector, graph, BUDGET)
     rng = np.random.default_rng(seed)
@@ -85,7 +86,7 @@ def test_no_flips_leave_the_bounds(make_detector):
 @given(graphs(min_nodes=4, max_nodes=12), st.integers(0, 2**16))
 @settings(max_examples=30, deadline=None)
 def the_optimum_stays_within(make_detector, graph, seed):
-    graph, keyframes = seen(graph, seed)
+    graph, keyframes = seen(suited(make_detector.target, graph), seed)
     detector = make_detector(keyframes)
     found = certify(detector, graph, BUDGET)
     optimum = Optimum(detector, AttackConfig(ratio=1.0))
@@ -153,4 +154,5 @@ def test_what_nothing_is_proven_of_is_refused(tmp_path):
 
 
 def test_without_a_candidate_no_flips_make_a_loop(make_detector):
-    assert certify(make_detector([]), make_graph(), 3).holds.tolist() == [True] * 4
+    graph = suited(make_detector.target, make_graph())
+    assert certify(make_detector([]), graph, 3).holds.tolist() == [True] * 4

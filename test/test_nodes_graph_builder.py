@@ -9,7 +9,9 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import ModelError
+from adversarial_lcd_ros.files.keys import make_key
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.sealing import is_sealed
 from adversarial_lcd_ros.vision.builder import Building, GraphBuilder
 from adversarial_lcd_ros.vision.draw import draw_graph
 
@@ -193,3 +195,28 @@ def test_frames_become_decisions(ros, node, lcd_model):
     ros.until(lambda: len(decisions) == 10)
     assert [d.stamp_ns // 10**9 for d in decisions] == list(range(10))
     assert [d.match_sequence for d in decisions[5:]] == [0, 1, 2, 3, 4]
+
+
+def test_a_builder_and_a_detector_with_one_key_take_each_others_graphs(ros, vocabulary, lcd_model,
+                                                                       core, tmp_path):
+    make_key(tmp_path / 'key')
+    key = str(tmp_path / 'key')
+    wires = ros.collect('graph', bytes)
+    decisions = ros.collect('loop_closures', lambda wire: codec.decode_loop_closure(unwrap(wire)))
+    builder = {'detector': 'none', 'vocabulary': vocabulary, 'features': 50, 'key': key}
+    lcd = ros.start(LcdNode, model=lcd_model, key=key)
+    first = ros.start(GraphBuilderNode, **builder)
+    publish(ros, ros.publisher('image', Image), *(
+        image_message(picture(second), second=second) for second in (1, 2)))
+    ros.until(lambda: len(decisions) == 2)
+    ros.stop(first)
+    ros.start(GraphBuilderNode, **builder)
+    publish(ros, ros.publisher('image', Image), image_message(picture(3), second=3))
+    ros.until(lambda: len(decisions) == 3)
+    assert all(is_sealed(unwrap(wire)) for wire in wires)
+    assert codec.decode_graph(unwrap(wires[0])) == core.build(picture(1), 10**9, 'camera_left')
+    replay = ros.publisher('graph')
+    ros.until(lambda: replay.get_subscription_count() == 2)  # lcd's, and that of this test
+    replay.publish(wires[1])
+    ros.until(lambda: lcd.diagnostics['refused graph: run'] == 1)
+    assert [decision.sequence for decision in decisions] == [0, 1, 0]

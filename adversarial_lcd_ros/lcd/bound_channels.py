@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from adversarial_lcd_ros.compiled.incidence import LENGTH_SCALE
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd import bound_kernels, kernels
-from adversarial_lcd_ros.lcd.bound import Range
+from adversarial_lcd_ros.lcd.bound import Range, shared_out
 from adversarial_lcd_ros.lcd.kernels import MIN_COSINE
 from adversarial_lcd_ros.lcd.targets.scores import object_cosines, share
 from adversarial_lcd_ros.lcd.views import Comparison, View
@@ -118,8 +118,9 @@ class NeighbourhoodBound:
         levels = np.array([*(level for level in self.LEVELS if level < budget), max(budget, 1)])
         now, lowest, highest = self._matches(levels)
         base = self._share @ now
-        gain = self._spend(np.maximum(highest - now[:, None], 0), levels, budget)
-        loss = self._spend(np.maximum(now[:, None] - lowest, 0), levels, budget)
+        gain, loss = (shared_out(np.maximum(change, 0), self._share, self._nodes.match_query,
+                                 levels, 2 * budget)[::2]
+                      for change in (highest - now[:, None], now[:, None] - lowest))
         return np.maximum(base - loss, 0), base + gain
 
     def _matches(self, levels: NDArray[np.int64]) -> tuple[NDArray[np.float64], ...]:
@@ -138,21 +139,6 @@ class NeighbourhoodBound:
             nodes.match_query, x0 @ x0.T, product, omega, present, levels)
         return (now, np.sqrt(np.maximum(least * norm[:, None] - MIN_COSINE - _SINGLE, 0)),
                 np.sqrt(np.maximum(largest * norm[:, None] - MIN_COSINE + _SINGLE, 0)))
-
-    def _spend(self, change: NDArray[np.float64], levels: NDArray[np.int64], budget: int
-               ) -> NDArray[np.float64]:
-        """Return how far each candidate's score can move by up to 0, 1, ... budget flips."""
-        price = np.r_[1, levels[:-1] + 1]
-        node, first = np.unique(self._nodes.match_query, return_index=True)
-        moved = np.zeros((budget + 1, len(self._share)))
-        for candidate, weight in enumerate(self._share):
-            worth = (np.add.reduceat(change * weight[:, None], first) if len(node)
-                     else np.zeros((0, len(levels))))
-            most = np.zeros(2 * budget + 1)
-            for row in worth:
-                most = bound_kernels.spent(most, price, row)
-            moved[:, candidate] = most[::2]
-        return moved
 
 
 class ObjectBound:

@@ -138,6 +138,34 @@ def _least(weight: NDArray[np.float64], along: NDArray[np.float64],
 
 
 @compiled
+def mean_bounds(member: NDArray[np.bool_], low: NDArray[np.float64],
+                high: NDArray[np.float64], levels: NDArray[np.int64]
+                ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """
+    Return the least and largest means over sets after some members came or went, (k, l) each.
+
+    Parameters
+    ----------
+    member : bool, (k, n)
+        The sets; the mean of an empty one is 0.
+    low, high : float64, (k, n)
+        What each member is worth at least and at most.
+    levels : int64, (l,)
+        Most members that come or go.
+
+    """
+    least = np.empty((len(member), len(levels)))
+    largest = np.empty((len(member), len(levels)))
+    one = np.ones(member.shape[1])
+    for row in range(len(member)):
+        for level in range(len(levels)):
+            flips = levels[level]
+            largest[row, level] = largest_ratio(high[row], one, member[row], flips, 0.0)
+            least[row, level] = -largest_ratio(-low[row], one, member[row], flips, 0.0)
+    return least, largest
+
+
+@compiled
 def spent(before: NDArray[np.float64], price: NDArray[np.int64], worth: NDArray[np.float64]
           ) -> NDArray[np.float64]:
     """

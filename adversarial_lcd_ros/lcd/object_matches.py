@@ -78,10 +78,15 @@ class ObjectMatches:
         settled: NDArray[np.float64] = np.where(total > _ROUNDING * before, total, 0)
         return settled
 
-    def _alike(self, query: View) -> NDArray[np.float64]:
+    def around(self, query: View) -> NDArray[np.int64]:
+        """Return how many objects of each class each is joined with, (objects, classes)."""
         start, neighbour, _ = query.incidence
-        around = _around(start, neighbour, self.classes, self.other_around.shape[1])
-        alike: NDArray[np.float64] = _kernel(self.classes, around, self.other_classes,
+        around: NDArray[np.int64] = _around(start, neighbour, self.classes,
+                                            self.other_around.shape[1])
+        return around
+
+    def _alike(self, query: View) -> NDArray[np.float64]:
+        alike: NDArray[np.float64] = _kernel(self.classes, self.around(query), self.other_classes,
                                              self.other_around, self.iterations, self.other_class)
         return alike
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import ANCHORS
+from adversarial_lcd_ros.lcd.bound import Bound
+from adversarial_lcd_ros.lcd.object_bound import ObjectMatchBound
 from adversarial_lcd_ros.lcd.object_matches import ObjectMatches
 from adversarial_lcd_ros.lcd.single_flips import FlipChannel, Flips
 from adversarial_lcd_ros.lcd.targets.base import Scores, Target
@@ -42,6 +44,13 @@ class ObjectMatchFlips:
         return share(total, view.features, self._nodes.features) @ self._average.T
 
 
+class ObjectMatchRange(ObjectMatchBound):
+    """What no few flips can do to the score, by the numbers of this target."""
+
+    iterations: ClassVar[int] = ITERATIONS
+    other_class: ClassVar[float] = OTHER_CLASS
+
+
 class SymbioTarget(Target):
     """
     Matches of features, each times a soft Weisfeiler-Lehman kernel of the objects they hang on.
@@ -56,6 +65,7 @@ class SymbioTarget(Target):
     feels: ClassVar[Feels] = Feels.AT_OBJECTS
     graph_variant: ClassVar[str] = ANCHORS
     flip_channels: ClassVar[Sequence[type[FlipChannel]]] = (ObjectMatchFlips,)
+    bounds: ClassVar[Sequence[type[Bound]]] = (ObjectMatchRange,)
     iterations: ClassVar[int] = ITERATIONS
     other_class: ClassVar[float] = OTHER_CLASS
 
