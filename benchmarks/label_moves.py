@@ -61,8 +61,9 @@ def moved_frames(sequence: GraphSequence, before: FrameLabels, after: FrameLabel
     for frame, kinds in enumerate(zip(before.names, after.names, strict=True)):
         old = np.arange(after.candidates[frame])
         loops = old[(after.relation[frame, old] > 0) | (before.relation[frame, old] > 0)]
+        scaled = old[after.scaled[frame, old] & (kinds[1] == 'scale')]
         shared = old[after.possible[frame, old]]
-        among = next((part for part in (loops, shared, old) if len(part)), None)
+        among = next((part for part in (loops, scaled, shared, old) if len(part)), None)
         nearest = (frame if among is None else
                    int(among[np.linalg.norm(place[among] - place[frame], axis=1).argmin()]))
         moves.setdefault(kinds, []).append((frame, nearest))
