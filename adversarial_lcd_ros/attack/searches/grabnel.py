@@ -37,7 +37,7 @@ class _Known:
     Attributes
     ----------
     base : float64, (d,)
-        Features of the graph that the present stage starts from.
+        Features of the graph that the present stage starts from; of the clean one they are 0.
 
     """
 
@@ -63,6 +63,7 @@ class Grabnel(Search):
     colour: ClassVar[str] = '#b07d12'
     marker: ClassVar[str] = 'P'
     own_settings: ClassVar[tuple[str, ...]] = ('wl_iterations',)
+    query_share: ClassVar[float] = 10.0  # choosing a query takes so many times its own time
 
     def __init__(self, config: AttackConfig) -> None:
         super().__init__(config)
@@ -93,7 +94,7 @@ class Grabnel(Search):
         """Query flips of the best graph so far and commit the best; tell if there was any."""
         before, count = hunt.best, 0
         best: tuple[float, bool, NDArray[np.int64], NDArray[np.float64]] | None = None
-        while count < share and not (best and best[1]):
+        while count < share and not hunt.oracle.exhausted and not (best and best[1]):
             pairs, features = self._chosen(before, known, x, allowed, population, rng)
             if not len(pairs):
                 break
@@ -103,7 +104,6 @@ class Grabnel(Search):
                 try:
                     loss, succeeded = hunt.ask(before.flip(pair))
                 except BudgetError:
-                    count = share
                     break
                 count += 1
                 known.features.append(features[place])
@@ -115,7 +115,7 @@ class Grabnel(Search):
         if best is not None and (best[1] or best[0] >= hunt.loss):
             hunt.keep(before.flip(best[2]), best[0], best[1])
             known.base = best[3]
-        return count > 0
+        return count > 0 or bool(hunt.oracle.exhausted)
 
     def _chosen(self, graph: MultiTierGraph, known: _Known, x: NDArray[np.float64],
                 allowed: Allowed, population: int, rng: np.random.Generator
