@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.store import Row
 # Red is for false closures alone: all maps have one colour.
 TRUTH_COLOUR, ODOMETRY_COLOUR, MAP_COLOUR, FALSE_COLOUR = (
     '#c9cdd4', '#8c6d46', '#1f4e79', '#d62728')
+CHECKED_COLOUR = '#2e8064'
 _PANEL = 1.9  # inches
 _MARGIN = 0.08  # of the extent, on every side
 _FALSE_WIDTH, _TRUTH_WIDTH, _MAP_WIDTH = 0.7, 2.6, 1.2
