@@ -99,7 +99,7 @@ def make_maps(folder: Path, config: MapConfig, workers: Run, *, source: str | No
     cases = list(plan_cases(inputs, config, sweeps=sweeps))
     output = folder / FOLDER
     with open_store(output) as store:
-        tasks = _tasks(inputs, cases, config, folder, progress)
+        tasks = make_tasks(inputs, cases, config, folder, progress)
         _write_setup(output, folder, inputs, config, command_line)
         rows = _run(tasks, store, workers, progress('maps'))
         summary = map_document(inputs, config, rows)
@@ -134,8 +134,9 @@ def plan_cases(inputs: MapInputs, config: MapConfig, *, sweeps: bool) -> Iterato
                     yield Case(CLEAN, WHOLE, whole, drift, draw, missing=missing)
 
 
-def _tasks(inputs: MapInputs, cases: Sequence[Case], config: MapConfig, folder: Path,
-           progress: Callable[[str], Progress]) -> list[Task]:
+def make_tasks(inputs: MapInputs, cases: Sequence[Case], config: MapConfig, folder: Path,
+               progress: Callable[[str], Progress]) -> list[Task]:
+    """Return the cases with what they are made of; raises EvaluationError."""
     pairs = [pairs_of(inputs, case, config) for case in cases]
     wanted = [_by_features(one, config) for one in pairs]
     for case, asked in zip(cases, wanted, strict=True):
@@ -253,7 +254,7 @@ def export_g2o(folder: Path, output: Path, config: MapConfig, *, source: str | N
     inputs = read_inputs(folder, str(replayed['sequence']), source)
     cases = [Case(run, WHOLE, len(inputs.frame), 1.0, 0) for run in inputs.runs]
     output.mkdir(parents=True, exist_ok=True)
-    for task in _tasks(inputs, cases, config, folder, progress):
+    for task in make_tasks(inputs, cases, config, folder, progress):
         path = output / f'{_file_name(task.case.run)}.g2o'
         write_g2o(path, pose_graph_of(task))
         yield path
