@@ -113,7 +113,8 @@ def map_case(run, draw, truth, error_m):
                'false_kept': 0, 'duration_s': 0.1, 'kept': [1, 0],
                'path': [[x + error_m, y, z] for x, y, z in truth]}
     return {'run': run, 'stage': 'whole', 'frames': 12, 'drift': 1.0, 'draw': draw, 'added': None,
-            'consistent': False, 'missing': None, 'right': 1, 'false': 1, 'unposed': 0,
+            'consistent': False, 'missing': None, 'checked': False, 'right': 1, 'false': 1,
+            'unposed': 0,
             'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures), 'truth': truth,
             'closures': [[9, 1, False], [11, 2, True]]}
 

@@ -82,7 +82,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def inputs(folder):
-    return read_inputs(folder, 'laps')
+    return read_inputs(folder, 'laps', labelled=True)
 
 
 def test_closures_are_right_false_or_cannot_be_told(inputs):
@@ -90,16 +90,17 @@ def test_closures_are_right_false_or_cannot_be_told(inputs):
     assert len(clean.pairs) == COUNT - LAP - 2
     assert not clean.pairs.is_false.any()
     assert forged.pairs.query[forged.pairs.is_false].tolist() == sorted(FALSE)
-    # 15 with 13: too near in time to be a loop, too near in space to be another place.
+    # 15 with 13: too near in space to be another place, too near in time to be the same.
     assert (clean.untold, forged.untold) == (1, 1)
     assert np.allclose(inputs.truth, wavy(COUNT, 2), atol=1e-6)
     assert inputs.first_loop == FIRST
 
 
-def test_another_sequence_is_refused(folder, tmp_path):
-    other = make.tum_folder(tmp_path / 'other', COUNT)
+@pytest.mark.parametrize(('count', 'labelled'), [(COUNT - 5, False), (COUNT, True)])
+def test_another_sequence_is_refused(folder, tmp_path, count, labelled):
+    other = make.tum_folder(tmp_path / 'other', count)
     with pytest.raises(EvaluationError, match='expected the sequence that was replayed'):
-        read_inputs(folder, 'laps', str(other))
+        read_inputs(folder, 'laps', str(other), labelled=labelled)
 
 
 def test_results_that_do_not_say_their_sequence_ask_for_it(folder, tmp_path):
@@ -155,8 +156,9 @@ def test_an_excess_is_over_the_same_draws_of_the_clean_run():
         figures = {'ate_m': error, 'rpe_m': None, 'rpe_deg': None, 'right_kept': 1,
                    'false_kept': 0, 'duration_s': 0.1}
         return {'run': run, 'stage': 'whole', 'frames': 9, 'drift': 1.0, 'draw': draw,
-                'added': None, 'consistent': False, 'missing': None, 'right': 1, 'false': 0,
-                'unposed': 0, 'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures)}
+                'added': None, 'consistent': False, 'missing': None, 'checked': False,
+                'right': 1, 'false': 0, 'unposed': 0,
+                'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures)}
 
     rows = summarise_cases([case('clean', 0, 1.0), case('forger', 0, 1.5), case('clean', 1, 3.0),
                             case('forger', 1, 3.5)])

@@ -1,14 +1,14 @@
-"""adversarial-lcd map: what the closures of a replay do to the map."""
+"""adversarial-lcd map and render: what the closures of a replay do to the map."""
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
 import os
 from pathlib import Path
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros.commands.common import (
     Commands,
@@ -23,6 +23,9 @@ from adversarial_lcd_ros.config import MapConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import add_config_options, config_from_options
 
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
+
 PREFIX = 'map-'
 
 
@@ -36,18 +39,42 @@ def add(commands: Commands) -> None:
                         metavar='RESULTS', help='results folder of a replay (default: '
                         '%(default)s); a folder "map" is made in it, and what is finished there '
                         'is not made again')
-    parser.add_argument('--sequence', metavar='SEQUENCE', help='the sequence that was replayed, '
-                        'where the results do not say, or it has moved')
     parser.add_argument('--export-g2o', type=Path, metavar='FOLDER', help='write the pose graph '
                         'of every run there, for any solver that reads g2o, and make no maps')
+    parser.add_argument('--sweeps', action='store_true', help='vary the drift, add false '
+                        'closures, and leave out right ones, too')
+    add_json_option(parser)
+    _add_shared_options(parser)
+
+
+def _add_shared_options(parser: ArgumentParser) -> None:
+    parser.add_argument('--sequence', metavar='SEQUENCE', help='the sequence that was replayed, '
+                        'where the results do not say, or it has moved')
     parser.add_argument('--jobs', type=int, metavar='N',
                         help='processes (default: one for each core)')
     parser.add_argument('--config', type=Path, metavar='FILE',
                         help='settings (YAML); options of the command line win over it')
-    parser.add_argument('--sweeps', action='store_true', help='vary the drift, add false '
-                        'closures, and leave out right ones, too')
-    add_json_option(parser)
     add_config_options(parser, MapConfig, PREFIX)
+
+
+def add_render(commands: Commands) -> None:
+    """Declare the command ``render``."""
+    parser = add_command(
+        commands, 'render', 'Write an animation of the map of a run as it is made, frame after '
+        'frame, by odometry alone and by every back end.', _render)
+    parser.usage = f'{parser.prog} [RESULTS] [OPTIONS]'
+    parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
+                        metavar='RESULTS', help='results folder of a replay (default: '
+                        '%(default)s)')
+    parser.add_argument('--output', type=Path, default=Path('map.gif'), metavar='FILE',
+                        help='.gif or .mp4 (default: %(default)s)')
+    parser.add_argument('--run', metavar='NAME', dest='shown', help='"clean" or the name of an '
+                        'attack (default: the run with the most false closures)')
+    parser.add_argument('--seconds', type=float, default=0.0, metavar='X', help='of the sequence '
+                        'that are shown; 0: all (default: %(default)s)')
+    parser.add_argument('--steps', type=int, default=60, metavar='N', help='pictures (default: '
+                        '%(default)s)')
+    _add_shared_options(parser)
 
 
 def check(options: Namespace) -> None:
@@ -80,24 +107,49 @@ def _map(options: Namespace) -> None:
 def make(folder: Path, options: Namespace, *, source: str | None = None,
          sweeps: bool = False, jobs: int | None = None) -> dict[str, Any]:
     """Make the maps of a results folder and put them into its report; return their summary."""
-    from adversarial_lcd_ros.evaluation.kinds import open_results
-    from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
     from adversarial_lcd_ros.evaluation.maps.report import FOLDER, report_maps
     from adversarial_lcd_ros.evaluation.maps.run import make_maps
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
-    kind, results = open_results(folder)
-    if kind.name != ReplayResults.name:
-        raise ConfigError(f'{folder} has results of the kind "{kind.name}": maps are made of '
-                          f'the kind "{ReplayResults.name}", every frame of a sequence')
-    if jobs is not None and jobs < 1:
-        raise ConfigError(f'--jobs {jobs}: expected 1 or more')
-    with _Bars() as bars, local_workers(jobs or os.cpu_count() or 1) as workers:
+    kind, results = _open_replay(folder)
+    with _Bars() as bars, local_workers(_processes(jobs)) as workers:
         summary = make_maps(folder, config_from_options(options, MapConfig), workers,
                             source=source, sweeps=sweeps, command_line=sys.argv, progress=bars)
     report_maps(folder / FOLDER)
     kind.report(results)
     return summary
+
+
+def _open_replay(folder: Path) -> tuple[ResultsKind, Results]:
+    from adversarial_lcd_ros.evaluation.kinds import open_results
+    from adversarial_lcd_ros.evaluation.kinds.replay import ReplayResults
+
+    kind, results = open_results(folder)
+    if kind.name != ReplayResults.name:
+        raise ConfigError(f'{folder} has results of the kind "{kind.name}": maps are made of '
+                          f'the kind "{ReplayResults.name}", every frame of a sequence')
+    return kind, results
+
+
+def _processes(jobs: int | None) -> int:
+    if jobs is not None and jobs < 1:
+        raise ConfigError(f'--jobs {jobs}: expected 1 or more')
+    return jobs or os.cpu_count() or 1
+
+
+def _render(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.maps.animation import animate
+    from adversarial_lcd_ros.evaluation.workers import local_workers
+
+    if options.steps < 1 or options.seconds < 0:
+        raise ConfigError(f'--steps {options.steps}, --seconds {options.seconds:g}: expected 1 or '
+                          'more, and 0 or more')
+    _open_replay(options.folder)
+    with _Bars() as bars, local_workers(_processes(options.jobs)) as workers:
+        animate(options.folder, options.output, config_from_options(options, MapConfig), workers,
+                run=options.shown, steps=options.steps, seconds=options.seconds,
+                source=options.sequence, progress=bars)
+    print(options.output)
 
 
 class _Bars(ExitStack):

@@ -71,7 +71,8 @@ def make_parser() -> Parser:
     commands = base.add_subparsers(metavar='COMMAND', required=True)
     for add in (evaluate.add_demo, importing.add, build.add, evaluate.add, report.add,
                 compare.add, targets.add, certify.add, train.add, fetch_model.add, compiling.add,
-                clean.add, labels.add, maps.add, inspect.add, convert.add, params.add, key.add):
+                clean.add, labels.add, maps.add, maps.add_render, inspect.add, convert.add,
+                params.add, key.add):
         add(commands)
     return parser
 

@@ -34,7 +34,7 @@ class MapResults(ResultsKind):
     schema = SCHEMA
     columns = {
         'run': str, 'stage': str, 'frames': int, 'drift': MEASURED, 'back_end': str, 'draws': int,
-        'added': NUMBER, 'consistent': bool, 'missing': NUMBER, 'ate_m': MEASURED,
+        'added': NUMBER, 'consistent': bool, 'checked': bool, 'missing': NUMBER, 'ate_m': MEASURED,
         'ate_ci95': INTERVAL, 'excess_m': NUMBER, 'excess_ci95': INTERVAL,
         **dict.fromkeys(('right', 'false', 'right_kept', 'false_kept', 'duration_s'), MEASURED),
         **dict.fromkeys(('rpe_m', 'rpe_deg'), NUMBER)}

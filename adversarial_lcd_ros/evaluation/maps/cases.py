@@ -54,6 +54,8 @@ class Case:
         Those that are added agree with one another.
     missing : float or None
         Right closures of the run, but for this share of them; None: as declared.
+    checked : bool
+        Those alone that a geometric check behind the detector bears out.
 
     """
 
@@ -65,6 +67,7 @@ class Case:
     added: int | None = None
     consistent: bool = False
     missing: float | None = None
+    checked: bool = False
 
 
 GROUP = tuple(entry.name for entry in fields(Case) if entry.name != 'draw')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from adversarial_lcd_ros.config import BuilderConfig, ConfigT, LabelConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
+    NO_TRUTH,
     QueryRecord,
     column,
     read_records,
@@ -23,7 +24,13 @@ from adversarial_lcd_ros.evaluation.results import CONFIGURATION, RECORDS, read_
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
-from adversarial_lcd_ros.ground_truth.labels import FrameLabels, located_poses
+from adversarial_lcd_ros.ground_truth.labels import (
+    ELSEWHERE,
+    POSITIVE,
+    RIGHT,
+    located_poses,
+)
+from adversarial_lcd_ros.registry import NONE
 from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory, open_sequence
 from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.slam.closures import Pairs
@@ -41,17 +48,23 @@ class Declared:
     Attributes
     ----------
     pairs : Pairs
-        Right ones, and those that certainly name another place.
+        Right ones, and those that certainly show another place.
+    stands : bool, (k,), or None
+        Which of them a geometric check behind the detector bears out; None: nobody asked it.
     untold : int
         Of neither kind: no edges of the map.
     unlocated : int
         With a frame that has no ground truth pose.
+    is_clean : bool
+        The features that the detector got are those of the camera.
 
     """
 
     pairs: Pairs
+    stands: NDArray[np.bool_] | None
     untold: int
     unlocated: int
+    is_clean: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +85,7 @@ class MapInputs:
         Camera to world.
     runs : mapping of str to Declared
         The clean run first.
-    elsewhere : bool, (n, n)
+    elsewhere : bool, (n, n), or None
         Pairs that certainly show different places, the older frame old enough to be a match.
     first_loop : int or None
         The first frame that by ground truth has a loop; None without one.
@@ -86,7 +99,7 @@ class MapInputs:
     stamp_ns: NDArray[np.int64]
     truth: Motions
     runs: Mapping[str, Declared]
-    elsewhere: NDArray[np.bool_]
+    elsewhere: NDArray[np.bool_] | None
     first_loop: int | None
     focal_px: float
 
@@ -96,7 +109,7 @@ class MapInputs:
         return float(np.median(np.diff(self.stamp_ns))) / 1e9
 
 
-def read_inputs(folder: Path, name: str, source: str | None = None,
+def read_inputs(folder: Path, name: str, source: str | None = None, *, labelled: bool = False,
                 progress: Progress | None = None) -> MapInputs:
     """
     Return what the maps of a results folder are made of.
@@ -109,6 +122,8 @@ def read_inputs(folder: Path, name: str, source: str | None = None,
         Of the sequence.
     source : str, optional
         The sequence, where it is not where the folder says, or the folder does not say.
+    labelled : bool
+        Look for pairs that certainly show different places.
     progress : callable, optional
         Called with frames labelled and in all.
 
@@ -127,23 +142,27 @@ def read_inputs(folder: Path, name: str, source: str | None = None,
                           'name it with --sequence')
     records = runs_of(read_records(folder / RECORDS))
     clean = records[CLEAN]
-    views, focal_px = _views(Path(source), column(clean, 'stamp_ns'),
-                             section_of(configuration, LabelConfig))
-    labels = label_views(views, section_of(configuration, LabelConfig), progress).labels
-    _check_same(labels, clean, source)
-    poses, located = located_poses(views.trajectory, labels.stamp_ns,
-                                   section_of(configuration, LabelConfig))
+    config = section_of(configuration, LabelConfig)
+    views, focal_px = _views(Path(source), column(clean, 'stamp_ns'), config)
+    poses, located = located_poses(views.trajectory, views.stamp_ns, config)
+    _check_same([record.kind != NO_TRUTH for record in clean], located.tolist(), source)
     frame = np.flatnonzero(located)
     if len(frame) < LEAST_FRAMES:
         raise EvaluationError(f'{source}: {len(frame)} frames with a ground truth pose: expected '
                               f'{LEAST_FRAMES} or more for a map')
-    loops = np.flatnonzero(labels.kind[frame] > 0)
-    old = np.arange(len(located))[None, :] < labels.candidates[:, None]
+    loops = np.flatnonzero(column(clean, 'label')[frame] == POSITIVE)
+    elsewhere = None
+    if labelled:
+        labels = label_views(views, config, progress).labels
+        _check_same([record.kind for record in clean], labels.names, source)
+        old = np.arange(len(located))[None, :] < labels.candidates[:, None]
+        elsewhere = (labels.elsewhere & old)[np.ix_(frame, frame)]
+    has_poster = any(section['values'].get('poster', NONE) != NONE
+                     for section in configuration.get('settings', ()))
     return MapInputs(
-        name, source, frame, labels.stamp_ns[frame], of_trajectory(poses)[frame],
-        {run: _declared(rows, labels, frame) for run, rows in records.items()},
-        (labels.elsewhere & old)[np.ix_(frame, frame)], int(loops[0]) if len(loops) else None,
-        focal_px)
+        name, source, frame, views.stamp_ns[frame], of_trajectory(poses)[frame],
+        {run: _declared(rows, frame, has_poster) for run, rows in records.items()},
+        elsewhere, int(loops[0]) if len(loops) else None, focal_px)
 
 
 def section_of(configuration: Mapping[str, Any], kind: type[ConfigT]) -> ConfigT:
@@ -179,6 +198,9 @@ def _views(source: Path, stamps: NDArray[np.int64],
         trajectory, size, focal = (sequence.trajectory, sequence.image_size,
                                    sequence.focal_length_px)
         graphs = []
+        missing = np.setdiff1d(stamps, sequence.stamps_ns)
+        if len(missing):
+            _refuse(source, missing.tolist())
     return (Views(stamps, size, _in_metres(trajectory, source), source, graphs),
             focal or labels.focal_length * size[0])
 
@@ -197,9 +219,13 @@ def chosen_graphs(graphs: Sequence[MultiTierGraph], stamps: NDArray[np.int64],
     by_stamp = {graph.stamp_ns: graph for graph in graphs}
     missing = [int(stamp) for stamp in stamps if int(stamp) not in by_stamp]
     if missing:
-        raise EvaluationError(f'{source} has no frame at {missing[0]} ns, and {len(missing)} such '
-                              'in all: expected the sequence that was replayed')
+        _refuse(source, missing)
     return [by_stamp[int(stamp)] for stamp in stamps]
+
+
+def _refuse(source: Path | str, missing: Sequence[Any]) -> NoReturn:
+    raise EvaluationError(f'{source} has no frame at {missing[0]} ns, and {len(missing)} such in '
+                          'all: expected the sequence that was replayed')
 
 
 def built_graphs(inputs: MapInputs, folder: Path,
@@ -210,34 +236,33 @@ def built_graphs(inputs: MapInputs, folder: Path,
                          inputs.stamp_ns, inputs.source)
 
 
-def _check_same(labels: FrameLabels, clean: Sequence[QueryRecord], source: str) -> None:
+def _check_same(then: Sequence[Any], now: Sequence[Any], source: str) -> None:
     """See that the ground truth says of the frames what it said when they were evaluated."""
-    match = np.array([-1 if record.match_frame is None else record.match_frame
-                      for record in clean], np.int64)
-    right = labels.is_correct(np.arange(len(clean)), match)
-    differing = sum(record.kind != kind or record.match_correct != bool(same)
-                    for record, kind, same in zip(clean, labels.names, right, strict=True))
+    differing = sum(one != other for one, other in zip(then, now, strict=True))
     if differing:
         raise EvaluationError(f'{source}: the ground truth says otherwise of {differing} frames '
                               'than when they were evaluated: expected the sequence that was '
                               'replayed, and the same release')
 
 
-def _declared(rows: Sequence[QueryRecord], labels: FrameLabels,
-              frame: NDArray[np.int64]) -> Declared:
+def _declared(rows: Sequence[QueryRecord], frame: NDArray[np.int64],
+              has_poster: bool) -> Declared:
     place = np.full(len(rows), -1)
     place[frame] = np.arange(len(frame))
-    edges, untold, unlocated = [], 0, 0
+    edges, untold, unlocated, support = [], 0, 0, []
     for record in rows:
         if not record.is_loop or record.match_frame is None:
             continue
         query, match = int(place[record.frame]), int(place[record.match_frame])
-        is_false = bool(labels.elsewhere[record.frame, record.match_frame])
         if query < 0 or match < 0:
             unlocated += 1
-        elif record.match_correct or is_false:
-            edges.append((query, match, is_false and not record.match_correct))
+        elif record.match_is in (RIGHT, ELSEWHERE):
+            edges.append((query, match, record.match_is == ELSEWHERE))
+            support.append(record.support)
         else:
             untold += 1
     table = np.array(edges, np.int64).reshape(-1, 3)
-    return Declared(Pairs(table[:, 0], table[:, 1], table[:, 2].astype(bool)), untold, unlocated)
+    return Declared(
+        Pairs(table[:, 0], table[:, 1], table[:, 2].astype(bool)),
+        None if not support or None in support else np.array(support, np.float64) >= 1,
+        untold, unlocated, not has_poster and not any(record.nodes_moved for record in rows))

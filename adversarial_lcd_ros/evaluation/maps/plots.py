@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.store import Row
 # Red is for false closures alone: all maps have one colour.
 TRUTH_COLOUR, ODOMETRY_COLOUR, MAP_COLOUR, FALSE_COLOUR = (
     '#c9cdd4', '#8c6d46', '#1f4e79', '#d62728')
+CHECKED_COLOUR = '#2e8064'
 _PANEL = 1.9  # inches
 _MARGIN = 0.08  # of the extent, on every side
 _FALSE_WIDTH, _TRUTH_WIDTH, _MAP_WIDTH = 0.7, 2.6, 1.2
@@ -69,7 +70,7 @@ def draw_paths(shown: Sequence[Shown], back_ends: Sequence[str] = BACK_ENDS) -> 
     truth = np.array(shown[0].case['truth'])
     axes = flat_axes(truth)
     with matplotlib.rc_context(STYLE):
-        size = _panel_size(truth[:, axes])
+        size = panel_size(truth[:, axes])
         figure = Figure(figsize=(size[0] * len(columns) + 0.3, size[1] * len(shown) + 0.35),
                         layout='constrained')
         panels = figure.subplots(len(shown), len(columns), squeeze=False)
@@ -82,7 +83,8 @@ def draw_paths(shown: Sequence[Shown], back_ends: Sequence[str] = BACK_ENDS) -> 
     return figure
 
 
-def _panel_size(flat: NDArray[np.float64]) -> tuple[float, float]:
+def panel_size(flat: NDArray[np.float64]) -> tuple[float, float]:
+    """Return width and height of a panel for a path (n, 2), inches."""
     wide, high = np.ptp(flat, axis=0) + 1e-9
     return _PANEL, float(np.clip(_PANEL * high / wide, 0.6 * _PANEL, 1.4 * _PANEL)) + 0.2
 

@@ -13,9 +13,15 @@ import numpy as np
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.maps import plots
 from adversarial_lcd_ros.evaluation.maps.cases import WHOLE, YOUNG
-from adversarial_lcd_ros.evaluation.maps.plots import Shown, colour_of
+from adversarial_lcd_ros.evaluation.maps.plots import CHECKED_COLOUR, Shown, colour_of
 from adversarial_lcd_ros.evaluation.maps.summary import KIND, SCHEMA
-from adversarial_lcd_ros.evaluation.maps.tables import all_tables, is_main, metres, stage_title
+from adversarial_lcd_ros.evaluation.maps.tables import (
+    all_tables,
+    is_main,
+    metres,
+    run_title,
+    stage_title,
+)
 from adversarial_lcd_ros.evaluation.page import NARROW, STYLE, WIDE, data_uri, load_template, svg
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN
 from adversarial_lcd_ros.evaluation.results import (
@@ -29,7 +35,6 @@ from adversarial_lcd_ros.evaluation.store import Row, read_cells
 from adversarial_lcd_ros.files.writing import write_text
 
 FOLDER = 'map'  # in a results folder of a replay
-_RUNS_DRAWN = 3
 
 
 def map_sections(folder: Path) -> list[str]:
@@ -99,15 +104,20 @@ def _uri(figure: Figure) -> str:
 
 
 def shown_maps(folder: Path, summary: Mapping[str, Any], stage: str) -> list[Shown]:
-    """Return the clean run and those with the most false closures, of a stage, for pictures."""
-    cases = {case['run']: case for case in read_cells(folder)
+    """Return the clean run and the worst one, as it was and checked, of a stage."""
+    cases = {(case['run'], case['checked']): case for case in read_cells(folder)
              if case['stage'] == stage and 'truth' in case and _is_of(case, summary)}
     names = [run['name'] for run in summary['runs']]
-    attacks = sorted((name for name in names[1:] if name in cases),
-                     key=lambda name: -int(cases[name]['false']))
-    drawn = [CLEAN, *attacks[:_RUNS_DRAWN - 1]]
-    return [Shown(name, colour_of(names.index(name)), cases[name])
-            for name in names if name in drawn and name in cases]
+    worst = worst_run(summary)
+    drawn = dict.fromkeys([(CLEAN, False), (worst, False), (worst, True)])
+    return [Shown(run_title(cases[key]), CHECKED_COLOUR if key[1] else
+                  colour_of(names.index(key[0])), cases[key]) for key in drawn if key in cases]
+
+
+def worst_run(summary: Mapping[str, Any]) -> str:
+    """Return the attack with the most false closures; the clean run without attacks."""
+    attacks = summary['runs'][1:] or summary['runs']
+    return str(max(attacks, key=lambda run: int(run['false']))['name'])
 
 
 def _is_of(case: Row, summary: Mapping[str, Any]) -> bool:
@@ -117,11 +127,11 @@ def _is_of(case: Row, summary: Mapping[str, Any]) -> bool:
 
 def headline(summary: Mapping[str, Any]) -> str:
     """Return in a sentence what the attack with the most false closures did to the young map."""
-    main = [row for row in summary['rows'] if is_main(row)]
+    main = [row for row in summary['rows'] if is_main(row) and not row['checked']]
     if len(summary['runs']) < 2:
         return ''
     stage = main[0]['stage']
-    worst = max(summary['runs'][1:], key=lambda run: run['false'])['name']
+    worst = worst_run(summary)
     error = {(row['run'], row['back_end']): row['ate_m'] for row in main
              if row['stage'] == stage}
     least, gnc = ((error[CLEAN, name], error[worst, name]) for name in ('least_squares', 'gnc'))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig, MapConfig
+from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.maps.cases import (
     WHOLE,
     YOUNG,
@@ -93,11 +94,12 @@ def make_maps(folder: Path, config: MapConfig, workers: Run, *, source: str | No
     """
     gtsam()  # told before the work
     replayed = read_json(folder / SUMMARY)
-    inputs = read_inputs(folder, str(replayed['sequence']), source, progress('labels'))
+    inputs = read_inputs(folder, str(replayed['sequence']), source, labelled=sweeps,
+                         progress=progress('labels'))
     cases = list(plan_cases(inputs, config, sweeps=sweeps))
     output = folder / FOLDER
     with open_store(output) as store:
-        tasks = _tasks(inputs, cases, config, folder, progress)
+        tasks = make_tasks(inputs, cases, config, folder, progress)
         _write_setup(output, folder, inputs, config, command_line)
         rows = _run(tasks, store, workers, progress('maps'))
         summary = map_document(inputs, config, rows)
@@ -114,8 +116,10 @@ def plan_cases(inputs: MapInputs, config: MapConfig, *, sweeps: bool) -> Iterato
     worst = max(inputs.runs, key=lambda run: int(inputs.runs[run].pairs.is_false.sum()))
     for draw in range(config.draws):
         for stage, frames in stages:
-            for run in inputs.runs:
+            for run, declared in inputs.runs.items():
                 yield Case(run, stage, frames, 1.0, draw)
+                if declared.stands is not None:
+                    yield Case(run, stage, frames, 1.0, draw, checked=True)
             if not sweeps:
                 continue
             for drift in DRIFTS:
@@ -130,10 +134,16 @@ def plan_cases(inputs: MapInputs, config: MapConfig, *, sweeps: bool) -> Iterato
                     yield Case(CLEAN, WHOLE, whole, drift, draw, missing=missing)
 
 
-def _tasks(inputs: MapInputs, cases: Sequence[Case], config: MapConfig, folder: Path,
-           progress: Callable[[str], Progress]) -> list[Task]:
+def make_tasks(inputs: MapInputs, cases: Sequence[Case], config: MapConfig, folder: Path,
+               progress: Callable[[str], Progress]) -> list[Task]:
+    """Return the cases with what they are made of; raises EvaluationError."""
     pairs = [pairs_of(inputs, case, config) for case in cases]
     wanted = [_by_features(one, config) for one in pairs]
+    for case, asked in zip(cases, wanted, strict=True):
+        if asked and not inputs.runs[case.run].is_clean:
+            raise EvaluationError(
+                f'{case.run}: the attack changed features, which are not kept with the results: '
+                'nobody knows what they claim; choose other claims than "essential"')
     poses = _measured(inputs, folder, sorted(set().union(*wanted)), config, progress)
     apart = max(1, round(config.rpe_s / inputs.period_s))
     tasks = []
@@ -146,14 +156,18 @@ def _tasks(inputs: MapInputs, cases: Sequence[Case], config: MapConfig, folder: 
 
 def pairs_of(inputs: MapInputs, case: Case, config: MapConfig) -> Pairs:
     """Return the closures of a case, right and false, of the whole sequence."""
-    pairs = inputs.runs[case.run].pairs
+    declared = inputs.runs[case.run]
+    pairs = declared.pairs
+    if case.checked and declared.stands is not None:
+        return pairs.chosen(declared.stands)
     if case.added is None and case.missing is None:
         return pairs
     right = pairs.chosen(~pairs.is_false)
     rng = choice_of(config, case.draw)
     if case.missing is not None:
         return right.chosen(rng.permutation(len(right)) >= round(case.missing * len(right)))
-    false = _false_pairs(inputs.elsewhere[:case.frames], int(case.added or 0), rng,
+    elsewhere = np.zeros((0, 0), bool) if inputs.elsewhere is None else inputs.elsewhere
+    false = _false_pairs(elsewhere[:case.frames], int(case.added or 0), rng,
                          consistent=case.consistent)
     return Pairs(np.r_[right.query, false[:, 0]], np.r_[right.match, false[:, 1]],
                  np.r_[right.is_false, np.ones(len(false), bool)])
@@ -186,7 +200,7 @@ def _by_features(pairs: Pairs, config: MapConfig) -> set[tuple[int, int]]:
 
 def _measured(inputs: MapInputs, folder: Path, pairs: Sequence[tuple[int, int]],
               config: MapConfig, progress: Callable[[str], Progress]) -> Poses:
-    # An attack flips edges: features, and what they claim, are those of the clean graphs.
+    # Attacks on edges leave features as they are: they claim what those of clean graphs do.
     if not pairs:
         return {}
     graphs = built_graphs(inputs, folder, progress('graphs'))
@@ -237,10 +251,10 @@ def export_g2o(folder: Path, output: Path, config: MapConfig, *, source: str | N
     """
     gtsam()
     replayed = read_json(folder / SUMMARY)
-    inputs = read_inputs(folder, str(replayed['sequence']), source, progress('labels'))
+    inputs = read_inputs(folder, str(replayed['sequence']), source)
     cases = [Case(run, WHOLE, len(inputs.frame), 1.0, 0) for run in inputs.runs]
     output.mkdir(parents=True, exist_ok=True)
-    for task in _tasks(inputs, cases, config, folder, progress):
+    for task in make_tasks(inputs, cases, config, folder, progress):
         path = output / f'{_file_name(task.case.run)}.g2o'
         write_g2o(path, pose_graph_of(task))
         yield path

@@ -54,7 +54,7 @@ def _group(case: Mapping[str, Any]) -> tuple[Any, ...]:
 def _reference(group: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return the group that has the closures without harm."""
     names = dict(zip(GROUP, group, strict=True))
-    names['run'] = CLEAN
+    names |= {'run': CLEAN, 'checked': False}
     if names['added'] is not None:
         names |= {'added': 0, 'consistent': False}
     if names['missing'] is not None:

@@ -38,10 +38,16 @@ def stage_title(row: Mapping[str, Any]) -> str:
 
 def row_title(row: Mapping[str, Any]) -> str:
     """Return what a map is of, in words that another run has for the same."""
-    parts = [row['run'] if _is_declared(row) else closures_title(row), STAGE_TITLES[row['stage']]]
+    parts = [run_title(row) if _is_declared(row) else closures_title(row),
+             STAGE_TITLES[row['stage']]]
     if row['drift'] != 1.0:
         parts.append(f'{row["drift"]:g} times the drift')
     return ', '.join(parts)
+
+
+def run_title(row: Mapping[str, Any]) -> str:
+    """Return whose closures a map has, and whether they were checked."""
+    return f'{row["run"]}, checked' if row['checked'] else str(row['run'])
 
 
 def closures_title(row: Mapping[str, Any]) -> str:
@@ -77,7 +83,7 @@ def _runs(rows: Sequence[Row]) -> Iterator[Table]:
     for stage in dict.fromkeys(row['stage'] for row in main):
         yield (f'Absolute error in metres, {_stage_of(main, stage)}',
                [{'run': run, 'closures right / false': _closures(of), **_errors(of)}
-                for run, of in _by(main, 'run', stage).items()])
+                for run, of in _by_run(main, stage).items()])
 
 
 def _kept(rows: Sequence[Row]) -> Iterator[Table]:
@@ -91,13 +97,13 @@ def _kept(rows: Sequence[Row]) -> Iterator[Table]:
                   'relative error, m': metres(row['rpe_m']),
                   'degrees': number(row['rpe_deg'], 2),
                   'seconds': number(row['duration_s'], 2)}
-                 for run, of in _by(main, 'run', stage).items()
+                 for run, of in _by_run(main, stage).items()
                  for row in of if row['back_end'] != ODOMETRY]
         yield f'What back ends kept, {_stage_of(main, stage)}', table
 
 
 def _sweeps(rows: Sequence[Row]) -> Iterator[Table]:
-    drifting = [row for row in rows if _is_declared(row)]
+    drifting = [row for row in rows if _is_declared(row) and not row['checked']]
     if any(row['drift'] != 1.0 for row in drifting):
         drifted = {(row['run'], row['stage']) for row in drifting if row['drift'] != 1.0}
         chosen = [row for row in drifting if (row['run'], row['stage']) in drifted]
@@ -121,11 +127,11 @@ def _stage_of(rows: Sequence[Row], stage: str) -> str:
     return stage_title(next(row for row in rows if row['stage'] == stage))
 
 
-def _by(rows: Sequence[Row], name: str, stage: str) -> dict[str, list[Row]]:
+def _by_run(rows: Sequence[Row], stage: str) -> dict[str, list[Row]]:
     groups: dict[str, list[Row]] = {}
     for row in rows:
         if row['stage'] == stage:
-            groups.setdefault(row[name], []).append(row)
+            groups.setdefault(run_title(row), []).append(row)
     return groups
 
 
