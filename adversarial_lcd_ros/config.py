@@ -234,7 +234,7 @@ class LcdConfig(Config):
         6, 'Rederive, rederive_check: nearest features that a feature is joined with, as '
         'feature_neighbours of graph_builder.', low=0, high=50)
     common_share: float = setting(
-        0.15, 'Defence common_part: least share of the features in what both frames see that '
+        0.136, 'Defence common_part: least share of the features in what both frames see that '
         'match in place; the default is for graphs of about 300 features.', low=0.001, high=1.0)
     hard_answers: bool = setting(
         False, 'Answer queries with the decision only, not with the probability.')
