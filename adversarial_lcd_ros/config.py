@@ -205,6 +205,9 @@ class LcdConfig(Config):
     map_window: int = setting(
         1, 'Temporal consistency: a candidate is scored together with this many keyframes '
         'before and after it.', low=0, high=20)
+    kept_loops: float = setting(
+        0.95, 'Operating point: share of the loops met in training that the decision keeps at '
+        'probability 0.5; the fewer, the more a loop has to show.', low=0.5, high=1.0)
     threshold: float = setting(
         0.5, 'A loop closure is declared from this probability on.', low=0.0, high=1.0)
     defences: str = setting(
@@ -230,6 +233,9 @@ class LcdConfig(Config):
     rederive_neighbours: int = setting(
         6, 'Rederive, rederive_check: nearest features that a feature is joined with, as '
         'feature_neighbours of graph_builder.', low=0, high=50)
+    common_share: float = setting(
+        0.136, 'Defence common_part: least share of the features in what both frames see that '
+        'match in place; the default is for graphs of about 300 features.', low=0.001, high=1.0)
     hard_answers: bool = setting(
         False, 'Answer queries with the decision only, not with the probability.')
     max_keyframes: int = setting(

@@ -172,6 +172,7 @@ DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
     'length_check': 'length_check:LengthCheck',
     'rederive': 'rederive:Rederive',
     'rederive_check': 'rederive:RederiveCheck',
+    'common_part': 'common_part:CommonPart',
 }, 'defences')
 
 SEARCHES = Table('search', 'attack.search:Search', {

@@ -21,6 +21,8 @@ from adversarial_lcd_ros.paths import model_path
 # Everything that a detector may have between a graph and its answer.
 SETTINGS = {
     'plain': {}, 'geometric check': {'geometric_check': True, 'geometric_inliers': 15},
+    'common part': {'defences': 'common_part', 'common_share': 0.6},
+    'operating point': {'kept_loops': 0.7},
     **{name: {'defences': f'own_defences:{name}'} for name in (
         'DropsLongEdges', 'DropsAllAtThree', 'IgnoresEdges', 'CountsLikeLengths', 'RefusesEven')},
     'length check': {'defences': 'length_check', 'length_factor': 1.3},
@@ -40,7 +42,8 @@ def make_detector(request, tmp_path):
     channels = TARGETS[target].channels
     path = tmp_path / 'model.json'
     # The bias is such that decisions fall on either side.
-    Decision(target, channels, (7.0, 9.0, 5.0)[:len(channels)], -8.0).save(path)
+    points = tuple(np.linspace(2, -4, 51)) if name == 'operating point' else ()
+    Decision(target, channels, (7.0, 9.0, 5.0)[:len(channels)], -8.0, points).save(path)
     if target == 'gnn':
         shutil.copy(model_path(NETWORK), path.with_suffix('.onnx'))
 

@@ -93,6 +93,10 @@ CARD = {'format': FORMAT, 'target': 'wl', 'channels': list(TARGETS['wl'].channel
     ({'bias': 1e308}, 'expected 3 finite weights and a bias, from'),
     ({'weights': []}, 'expected 3 finite weights'),
     ({'weights': None}, 'no trained decision'),
+    ({'operating_points': [1.0]}, 'expected 51 operating points that fall'),
+    ({'operating_points': [*range(51)]}, 'expected 51 operating points that fall'),
+    ({'operating_points': [1e308] * 51}, 'expected 51 operating points that fall'),
+    ({'operating_points': 3}, 'no trained decision'),
     ({'target': 'vbow'}, 'was trained for target vbow'),
     ({'card': 3}, 'no trained decision'),
 ])

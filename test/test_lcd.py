@@ -14,7 +14,7 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, ModelError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.keyframes.database import Database, bow_score
-from adversarial_lcd_ros.lcd.decision import Decision, probability
+from adversarial_lcd_ros.lcd.decision import FORMAT, Decision, probability
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import TARGETS, make_target
 from adversarial_lcd_ros.lcd.targets.gnn import NETWORK
@@ -266,9 +266,11 @@ def test_a_full_database_goes_on_judging(model, limit):
     ('{}', 'no trained decision'),
     (json.dumps({'format': 'x', 'target': 'wl', 'channels': [], 'weights': [], 'bias': 0}),
      'format'),
-    (json.dumps({'format': 'adversarial_lcd_ros/decision/1', 'target': 'edges',
+    (json.dumps({'format': 'adversarial_lcd_ros/decision/1', 'target': 'wl', 'channels': [],
+                 'weights': [], 'bias': 0}), 'train it anew'),
+    (json.dumps({'format': FORMAT, 'target': 'edges',
                  'channels': ['edges'], 'weights': [1], 'bias': 0}), 'trained for target edges'),
-    (json.dumps({'format': 'adversarial_lcd_ros/decision/1', 'target': 'wl',
+    (json.dumps({'format': FORMAT, 'target': 'wl',
                  'channels': ['edges', 'features', 'objects'], 'weights': [1], 'bias': 0}),
      '3 finite weights'),
 ])

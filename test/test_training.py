@@ -1,5 +1,6 @@
 """Training end to end on a tiny tour: what is written, that it repeats, what is refused."""
 
+from dataclasses import replace
 from functools import partial
 import json
 import sys
@@ -19,6 +20,7 @@ from adversarial_lcd_ros.errors import (
     SequenceError,
 )
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.paths import model_path
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.training import run as training_run
 from adversarial_lcd_ros.training.run import TrainingPlan, train
@@ -27,6 +29,8 @@ from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 LAP, PERIOD_NS = 20, 500_000_000
 PLAN = TrainingPlan(BuilderConfig(detector='none', features=60, detected_features=200),
+                    # The places are textures, and no surface that an audit could find.
+                    labels=replace(training_run.TRAINING_LABELS, rule='overlap'),
                     targets=('wl', 'vbow', 'symbio'), pairs=40, branching=4, depth=2,
                     flips_per_frame=2)
 
@@ -90,6 +94,11 @@ def test_the_card_says_what_was_trained_on(trained):
     # Every place is seen twice, and no two places look alike.
     assert pairs['loops'] == 20
     assert pairs['balanced_accuracy'] > 0.95
+    points = card['targets']['wl']['operating_points']
+    assert points['loops'] == [20]
+    assert points['min_gap_s'] == 3
+    odds = [points['log_odds'][share] for share in ('1.00', '0.95', '0.90', '0.50')]
+    assert odds == sorted(odds)
 
 
 def test_same_seed_same_bytes(tour, trained, tmp_path):
@@ -171,6 +180,18 @@ def test_a_network_without_pytorch_is_refused_before_the_work(tour, tmp_path, mo
     monkeypatch.setattr(training_run, 'open_source', None)
     with pytest.raises(ModelError, match=r'pip install "adversarial_lcd_ros\[gnn\]"'):
         train([SequencePart(tour)], tmp_path / 'models', plan=TrainingPlan(targets=('gnn',)))
+
+
+def test_a_network_of_an_earlier_training_is_used_without_pytorch(tour, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'torch', None)
+    plan = replace(PLAN, targets=('gnn',), flips_per_frame=0,
+                   networks=model_path('target_gnn.onnx').parent)
+    card = train([SequencePart(tour)], tmp_path / 'models', plan=plan)
+    assert ((tmp_path / 'models/target_gnn.onnx').read_bytes()
+            == model_path('target_gnn.onnx').read_bytes())
+    assert card['targets']['gnn']['operating_points']['loops'][0] > 0
+    with pytest.raises(ModelError, match=r'has no target_gnn\.onnx: expected the folder'):
+        train([SequencePart(tour)], tmp_path / 'other', plan=replace(plan, networks=tmp_path))
 
 
 @pytest.mark.parametrize(('text', 'part'), [

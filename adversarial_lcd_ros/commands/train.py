@@ -29,6 +29,9 @@ def add(commands: Commands) -> None:
                         'data (default: all but gnn, which needs PyTorch)')
     parser.add_argument('--vocabulary', type=Path, metavar='FILE',
                         help='use this vocabulary (npz) instead of training one')
+    parser.add_argument('--networks', type=Path, metavar='FOLDER',
+                        help='use the networks of the training in this folder, as of gnn, '
+                        'instead of training them')
     parser.add_argument('--vocabulary-stride', type=int, default=2, metavar='N',
                         help='every how many frames one is used for the vocabulary (default: '
                         '%(default)s)')
@@ -64,7 +67,7 @@ def _train(options: Namespace) -> None:
         builder, config_from_options(options, LcdConfig),
         replace(TRAINING_LABELS, **chosen_settings(options, LabelConfig)),
         tuple(options.targets or default_targets()), options.pairs, options.vocabulary_stride,
-        flips_per_frame=options.flips_per_frame)
+        flips_per_frame=options.flips_per_frame, networks=options.networks)
     card = train(sources, options.output, seed=options.seed, plan=plan, stage=progress_bar,
                  overwrite=options.overwrite, command_line=['adversarial-lcd', *sys.argv[1:]],
                  licences=options.licence)

@@ -3,11 +3,16 @@ Scores of a target -> calibrated probability, by logistic regression kept as JSO
 
 On square roots of the scores: these are shares with a long tail, and their roots are nearer to
 what a logistic decision expects.
+
+Where classes lie far apart in training, the fit does not tell where between them the line should
+be drawn. So a decision carries operating points: the log odds that training loops reached as a
+detector meets them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any
@@ -19,7 +24,9 @@ from adversarial_lcd_ros.errors import FileError, ModelError
 from adversarial_lcd_ros.files.reading import read_json
 from adversarial_lcd_ros.files.writing import write_json
 
-FORMAT = 'adversarial_lcd_ros/decision/1'
+FORMAT = 'adversarial_lcd_ros/decision/2'
+# Percent of the training loops kept at each operating point.
+KEPT_PERCENT = tuple(range(50, 101))
 # Scores are shares: beyond this a decision is a step, and sums leave the range of numbers.
 _MAX_WEIGHT = 1e9
 _MAX_BYTES = 1 << 20
@@ -39,6 +46,9 @@ class Decision:
     weights : tuple of float
         One for each channel.
     bias : float
+    operating_points : tuple of float
+        Log odds down to which 50, 51, ... 100 percent of the training loops are kept, falling;
+        none: only the fit is known.
     card : dict
         How it was trained: sequences, licences, sizes, figures.
 
@@ -48,6 +58,7 @@ class Decision:
     channels: tuple[str, ...]
     weights: tuple[float, ...]
     bias: float
+    operating_points: tuple[float, ...] = ()
     card: dict[str, Any] = field(default_factory=dict)
 
     def logit(self, scores: ArrayLike) -> NDArray[np.float64]:
@@ -68,10 +79,29 @@ class Decision:
         logit: NDArray[np.float64] = self.bias + roots @ np.asarray(self.weights)
         return logit
 
+    def keeping(self, share: float) -> Decision:
+        """
+        Return the decision with log odds 0 where it keeps a share of the training loops.
+
+        A decision without operating points stays as it was fitted.
+
+        Parameters
+        ----------
+        share : float
+            From 0.5 to 1.
+
+        """
+        if not self.operating_points:
+            return self
+        point = float(np.interp(100 * share, KEPT_PERCENT, self.operating_points))
+        return replace(self, bias=self.bias - point,
+                       operating_points=tuple(odds - point for odds in self.operating_points))
+
     def save(self, path: Path) -> None:
         """Write the decision and its card as JSON."""
         text = {'format': FORMAT, 'target': self.target, 'channels': list(self.channels),
-                'weights': list(self.weights), 'bias': self.bias, 'card': self.card}
+                'weights': list(self.weights), 'bias': self.bias,
+                'operating_points': list(self.operating_points), 'card': self.card}
         write_json(path, text)
 
     @classmethod
@@ -89,14 +119,17 @@ class Decision:
             text = read_json(path, _MAX_BYTES)
             decision = cls(str(text['target']), tuple(text['channels']),
                            tuple(float(weight) for weight in text['weights']),
-                           float(text['bias']), dict(text.get('card', {})))
+                           float(text['bias']),
+                           tuple(float(odds) for odds in text.get('operating_points', ())),
+                           dict(text.get('card', {})))
             kind = text['format']
         except (FileError, ValueError, TypeError, KeyError, OverflowError) as error:
             detail = error if isinstance(error, FileError) else repr(error)
             raise ModelError(f'{path} is no trained decision: {detail}; train one with '
                              '"adversarial-lcd train"') from error
         if kind != FORMAT:
-            raise ModelError(f'{path} has format {kind!r}: expected {FORMAT!r}')
+            raise ModelError(f'{path} has format {kind!r}: expected {FORMAT!r}; train it '
+                             'anew with "adversarial-lcd train"')
         if decision.target != target or decision.channels != channels:
             raise ModelError(f'{path} was trained for target {decision.target} '
                              f'{decision.channels}: expected {target} {channels}')
@@ -105,6 +138,12 @@ class Decision:
             raise ModelError(f'{path}: expected {len(channels)} finite weights and a bias, from '
                              f'-{_MAX_WEIGHT:g} to {_MAX_WEIGHT:g}, found {decision.weights} and '
                              f'{decision.bias}')
+        points = decision.operating_points
+        if points and (len(points) != len(KEPT_PERCENT) or not all(
+                -_MAX_WEIGHT <= below <= above <= _MAX_WEIGHT
+                for above, below in pairwise(points))):
+            raise ModelError(f'{path}: expected {len(KEPT_PERCENT)} operating points that fall, '
+                             f'within {_MAX_WEIGHT:g} of 0, found {points}')
         return decision
 
 

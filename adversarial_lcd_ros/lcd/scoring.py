@@ -161,7 +161,7 @@ class Judge:
     ----------
     scoring : Scoring
     decision : Decision
-        Trained, of the target.
+        Trained, of the target, at the operating point of the settings.
     threshold : float
         Probability from which on a loop is declared.
 
@@ -170,8 +170,9 @@ class Judge:
     def __init__(self, config: LcdConfig) -> None:
         self.scoring = Scoring.of(config)
         target = self.scoring.target
-        self.decision = Decision.load(decision_path(config.model, config.target), target.name,
-                                      target.channels)
+        fitted = Decision.load(decision_path(config.model, config.target), target.name,
+                               target.channels)
+        self.decision = fitted.keeping(config.kept_loops)
         self.threshold = config.threshold
 
     def verdict(self, logit: float, support: Callable[[], float]) -> tuple[bool, float]:

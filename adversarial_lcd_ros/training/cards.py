@@ -30,6 +30,7 @@ def decision_card(decision: Decision) -> dict[str, Any]:
     """Return the weights of a decision, and how it does on the pairs that it learned from."""
     return {'weights': dict(zip(decision.channels, decision.weights, strict=True)),
             'bias': decision.bias,
+            'operating_points': decision.card['operating_points'],
             'training_pairs': [
                 {'loops': sequence['loops'], 'others': sequence['others'],
                  'balanced_accuracy': accuracy}

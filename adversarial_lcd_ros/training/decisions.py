@@ -96,7 +96,7 @@ def training_pairs(sequence: TrainingSequence, labels: LabelConfig, count: int,
 
 def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: LcdConfig,
                    labels: LabelConfig, pairs: int, seed: int, network: Path,
-                   progress: Progress | None = None) -> Decision:
+                   train_network: bool = True, progress: Progress | None = None) -> Decision:
     """
     Return a decision for a target, with its card.
 
@@ -114,6 +114,8 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
     seed : int
     network : Path
         Where the network of a target that has one is written.
+    train_network : bool
+        Otherwise it is there already.
     progress : callable, optional
         Called with pairs done and to do.
 
@@ -128,7 +130,9 @@ def train_decision(target: str, sequences: Sequence[TrainingSequence], *, lcd: L
                       for sequence, chosen in zip(sequences, drawn, strict=True)],
         'map_window': lcd.map_window, 'labels': asdict(labels), 'seed': seed}
     lcd = replace(lcd, target=target)
-    trainer = make_trainer(target)
+    trainer = make_trainer(target) if train_network else None
+    if not train_network:
+        card['network'] = {'reused': True}
     if trainer:
         defences = make_defences(lcd)
         seen = [replace(pairs, graphs=[prepared(graph, defences) for graph in pairs.graphs])

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from adversarial_lcd_ros.errors import ModelError
 from adversarial_lcd_ros.lcd.targets import TARGETS
 from adversarial_lcd_ros.registry import load
 from adversarial_lcd_ros.sequences.sequence import Progress
+from adversarial_lcd_ros.training.model_folder import network_file
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs
 
 
@@ -45,3 +47,15 @@ def make_trainer(target: str) -> Trainer | None:
         return None
     trainer: Trainer = load(f'trainer of target {target}', reference)()
     return trainer
+
+
+def reused_network(target: str, folder: Path) -> Path | None:
+    """Return the network of a target in a folder, None if it needs none; raises ModelError."""
+    found = TARGETS.find(target)
+    if not found.trainer:
+        return None
+    network = folder / network_file(found.name)
+    if not network.is_file():
+        raise ModelError(f'{folder} has no {network.name}: expected the folder of a training '
+                         f'with the target {target}, or no --networks')
+    return network

@@ -2,8 +2,8 @@
 From sequences with ground truth to a folder of artefacts: ``adversarial-lcd train``.
 
 Vocabulary, decisions and surrogate data belong together: ``--models FOLDER`` swaps all of them at
-once. Labels are wider than those of the evaluation (``TRAINING_LABELS``): a decision should also
-see glancing revisits, and short sequences have few late ones.
+once. Labels are wider than those of the evaluation (``TRAINING_LABELS``): short sequences have
+few late revisits.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ from adversarial_lcd_ros.training.model_folder import (
     model_folder,
     network_file,
 )
-from adversarial_lcd_ros.training.networks import make_trainer
+from adversarial_lcd_ros.training.networks import make_trainer, reused_network
+from adversarial_lcd_ros.training.operating_points import meet_loops, with_operating_points
 from adversarial_lcd_ros.training.sources import (
     TrainingFrames,
     one_licence_each,
@@ -52,9 +53,10 @@ from adversarial_lcd_ros.vision.features import FeatureExtractor, to_grey
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
 
 FORMAT = 'adversarial_lcd_ros/model_card/1'
-# Wider than what an evaluation counts as a loop: the decision also learns from glancing ones,
-# and from revisits within a few seconds, which short sequences are full of.
-TRAINING_LABELS = LabelConfig(rule='overlap', min_gap_s=3.0, positive_overlap=0.45)
+# By exact co-visibility, or what else shows it, as those of an evaluation; but revisits within a
+# few seconds count, too, which short sequences are full of. The overlap is for the check before
+# the work, and for training by poses alone: wider, so that glancing revisits are seen.
+TRAINING_LABELS = LabelConfig(rule='auto', min_gap_s=3.0, positive_overlap=0.45)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
 
@@ -91,6 +93,8 @@ class TrainingPlan:
         Shape of the vocabulary: branching^depth words.
     flips_per_frame : int
         Flips queried on each frame of the first sequence; 0: no surrogate data.
+    networks : Path, optional
+        Folder of an earlier training whose networks are used instead of new ones.
 
     Raises
     ------
@@ -108,6 +112,7 @@ class TrainingPlan:
     branching: int = 16
     depth: int = 3
     flips_per_frame: int = 8
+    networks: Path | None = None
 
     def __post_init__(self) -> None:
         """Check names and ranges."""
@@ -197,7 +202,10 @@ def _open_all(sources: Sequence[SequencePart], licences: Sequence[str],
     if not sources:
         raise EvaluationError('no sequence to train on: expected at least one')
     for target in plan.targets:
-        make_trainer(target)
+        if plan.networks:
+            reused_network(target, plan.networks)
+        else:
+            make_trainer(target)
     opened = [open_source(source, licence) for source, licence in
               zip(sources, one_licence_each(sources, licences), strict=True)]
     for source in opened:
@@ -249,11 +257,22 @@ def _write_decisions(graphs: Mapping[str, Sequence[TrainingSequence]], plan: Tra
     card = {}
     for target in plan.targets:
         name = TARGETS.find(target).name
+        reused = plan.networks and reused_network(target, plan.networks)
+        if reused:
+            shutil.copyfile(reused, work / network_file(name))
         with stage(f'decision of {target}') as progress:
             decision = train_decision(target, graphs[needed_variant(target)], lcd=plan.lcd,
                                       labels=plan.labels, pairs=plan.pairs, seed=seed,
-                                      progress=progress, network=work / network_file(name))
-        decision.save(work / decision_file(name))
+                                      network=work / network_file(name),
+                                      train_network=not reused, progress=progress)
+        path = work / decision_file(name)
+        decision.save(path)  # where the detector that meets the loops finds it
+        with stage(f'operating points of {target}') as progress:
+            met = meet_loops(graphs[needed_variant(target)],
+                             replace(plan.lcd, target=target, model=str(work)), plan.labels,
+                             progress)
+        decision = with_operating_points(decision, met, plan.labels.min_gap_s)
+        decision.save(path)
         card[target] = {**decision_card(decision), 'graph_variant':
                         needed_variant(target) or plan.builder.graph_variant}
     return card
