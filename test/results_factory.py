@@ -14,9 +14,10 @@ from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
 from adversarial_lcd_ros.evaluation.replay.records import make_records, write_records
 from adversarial_lcd_ros.evaluation.replay.report import write_report
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.rings.report import write_rings
 from adversarial_lcd_ros.evaluation.store import open_store
 
-KINDS = ('replay', 'frames', 'targets', 'labels', 'map')
+KINDS = ('replay', 'frames', 'targets', 'labels', 'map', 'rings')
 
 
 def replay(path, *, found=range(30, 60), lcd=None, labels=None):
@@ -119,5 +120,27 @@ def map_case(run, draw, truth, error_m):
             'closures': [[9, 1, False], [11, 2, True]]}
 
 
-MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder, map_folder),
-                  strict=True))
+def ring_row(detector, search, name, outcomes, aware=True, seed=42, **more):
+    """Return a cell of a made-up attack; ``outcomes``: kind, outcome clean, and attacked."""
+    frames = [{'stamp': stamp, 'kind': kind, 'clean': clean, 'attacked': attacked,
+               'attacked_is': 'elsewhere' if attacked == 'FP' else '', 'edits': 3, 'queries': 5,
+               'nodes_moved': 2, 'node_budget': 4, 'edit_budget': 3}
+              for stamp, (kind, clean, attacked) in enumerate(outcomes)]
+    return {'sequence': 'tour', 'target': 'wl', 'detector': detector, 'threshold': 0.5,
+            'name': name, 'search': search, 'aware': aware, 'ratio': 3e-4, 'variant': '',
+            'seed': seed, 'frame_results': frames, **more}
+
+
+def rings_folder(path, *, lost=1, lcd=None, labels=None):
+    """Return an attack on edges and one on nodes; ``lost``: loops that they suppress, of 9."""
+    made = folder(path, [lcd or LcdConfig(), labels or LabelConfig()])
+    found = [(1, 'TP', 'FN' if at < lost else 'TP') for at in range(9)] + [(-1, 'TN', 'TN')] * 9
+    threshold = (lcd or LcdConfig()).threshold
+    rows = [ring_row('', search, search, found, threshold=threshold)
+            for search in ('recall', 'replay')]
+    write_rings(made.path, rows, [], [])
+    return path
+
+
+MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder, map_folder,
+                          rings_folder), strict=True))

@@ -14,6 +14,7 @@ from results_factory import (
     labels_folder,
     map_folder,
     replay,
+    rings_folder,
     targets_folder,
 )
 
@@ -27,8 +28,9 @@ from adversarial_lcd_ros.evaluation.replay.summary import as_document, from_docu
 
 CHANGED = {'replay': partial(replay, found=range(33, 60)), 'frames': partial(frames, power=0.6),
            'targets': partial(targets_folder, accuracy=0.5),
-           'labels': partial(labels_folder, positive=10), 'map': partial(map_folder, off_m=2.0)}
-REPORT = {**dict.fromkeys(KINDS, 'report.html'), 'targets': 'target.md'}
+           'labels': partial(labels_folder, positive=10), 'map': partial(map_folder, off_m=2.0),
+           'rings': partial(rings_folder, lost=4)}
+REPORT = {**dict.fromkeys(KINDS, 'report.html'), 'targets': 'target.md', 'rings': 'rings.md'}
 every_kind = pytest.mark.parametrize('kind', KINDS)
 
 

@@ -2,17 +2,21 @@
 
 from dataclasses import replace
 import json
+from types import SimpleNamespace
 
 import cv2
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from results_factory import ring_row
 
-from adversarial_lcd_ros.config import LcdConfig
-from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
+from adversarial_lcd_ros.evaluation.rings import report
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
     PosterConfig,
@@ -114,22 +118,12 @@ def test_controls_and_two_posters():
     assert 0.05 < (two[9] != 128).any(axis=2).mean() < 0.2
 
 
-def row(detector, search, name, outcomes, aware=True, seed=42, **more):
-    frames = [{'stamp': stamp, 'kind': kind, 'clean': clean, 'attacked': attacked,
-               'attacked_is': 'elsewhere' if attacked == 'FP' else '', 'edits': 3, 'queries': 5,
-               'nodes_moved': 2, 'node_budget': 4, 'edit_budget': 3}
-              for stamp, (kind, clean, attacked) in enumerate(outcomes)]
-    return {'sequence': 'tour', 'target': 'wl', 'detector': detector, 'threshold': 0.5,
-            'name': name, 'search': search, 'aware': aware, 'ratio': 3e-4, 'variant': '',
-            'seed': seed, 'frame_results': frames, **more}
-
-
 KEPT, LOST = (1, 'TP', 'TP'), (1, 'TP', 'FN')
 LEFT, MADE = (-1, 'TN', 'TN'), (-1, 'TN', 'FP')
-ROWS = [row('', 'recall', 'recall', [KEPT, LOST, LEFT, MADE]),
-        row('', 'move_nodes', '40 nodes', [LOST, KEPT, LEFT, MADE]),
-        row('defences rederive', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT]),
-        row('defences rederive', 'replay', 'replay', [KEPT, KEPT, MADE, MADE], aware=False)]
+ROWS = [ring_row('', 'recall', 'recall', [KEPT, LOST, LEFT, MADE]),
+        ring_row('', 'move_nodes', '40 nodes', [LOST, KEPT, LEFT, MADE]),
+        ring_row('defences rederive', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT]),
+        ring_row('defences rederive', 'replay', 'replay', [KEPT, KEPT, MADE, MADE], aware=False)]
 
 
 def test_an_entry_counts_what_changed():
@@ -142,7 +136,7 @@ def test_an_entry_counts_what_changed():
 
 
 def test_seeds_of_an_attack_are_one_entry():
-    again = row('', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT], seed=43)
+    again = ring_row('', 'recall', 'recall', [KEPT, KEPT, LEFT, LEFT], seed=43)
     entry = summarise([ROWS[0], again], 1)[0]
     assert (entry['seeds'], entry['frames'], entry['different_frames']) == (2, 8, 4)
     assert entry['decline_pp'] == 25
@@ -214,3 +208,45 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
     assert dict(checks)['check and hull'] == LcdConfig(defences='geometric_check',
                                                        geometric_hull=0.1)
     assert {condition.count for condition in conditions_of(config)} == {0, 1, 2}
+
+
+def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
+    stream = SimpleNamespace(name='tour', digest='a')
+    tasks = [SimpleNamespace(sequence='tour', later=later) for later in (5, 3)]
+    monkeypatch.setattr(report, 'poster_tasks', lambda *_: tasks)
+    asked = []
+
+    def run(function, some):
+        for task in some:
+            asked.append(task.later)
+            yield [{'sequence': task.sequence, 'later': task.later}]
+
+    def rows_of(stream):
+        return report.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
+                                  LabelConfig(), run, lambda done, total: None)
+
+    first = rows_of(stream)
+    assert [row['later'] for row in first] == [3, 5]
+    assert rows_of(stream) == first
+    assert asked == [5, 3]
+    (tmp_path / report.POSTERS).write_text('{"rows": 7}')
+    rows_of(stream)
+    rows_of(SimpleNamespace(name='tour', digest='b'))
+    assert asked == [5, 3] * 3
+
+
+def test_a_folder_of_rings_is_read_reported_and_compared(tmp_path):
+    prices = [{'sequence': 'tour', 'defence': 'none', 'decision_us': 9.0, 'more_us': 0.0}]
+    page = write_rings(tmp_path, ROWS, POSTERS, prices).read_text()
+    for name in ('configuration.json', 'environment.json'):
+        (tmp_path / name).write_text('{}')
+    kind, results = open_results(tmp_path)
+    assert kind.name == 'rings'
+    assert kind.report(results).read_text() == page
+    assert len(kind.tables(results)[0].rows) == len(results.rows) == 4
+    rows = [(figure.row, figure.name) for figure in kind.figures(results)]
+    assert len(set(rows)) == len(rows)
+    summary = json.loads((tmp_path / 'summary.json').read_text())
+    (tmp_path / 'summary.json').write_text(json.dumps({**summary, 'worst': 3}))
+    with pytest.raises(EvaluationError, match='damaged'):
+        open_results(tmp_path)

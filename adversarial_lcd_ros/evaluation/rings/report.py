@@ -57,26 +57,35 @@ def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, c
         Called with pairs done and to do.
 
     """
-    digest = digest_of(json.dumps([repr(config), repr(checks), repr(lcd), repr(labels),
-                                   sorted(stream.digest for stream in streams),
-                                   code_digest(*_CODE)]).encode())
     path = folder / POSTERS
+    digests = {stream.name: _digest(stream, config, checks, lcd, labels) for stream in streams}
+    rows = [row for row in _finished(path) if row['digest'] == digests.get(row['sequence'])]
+    done = {(row['sequence'], row['later']) for row in rows}
+    tasks = [task for stream in streams
+             for task in poster_tasks(stream, config, lcd, checks, labels)
+             if (task.sequence, task.later) not in done]
+    for count, part in enumerate(run(run_pair, tasks), 1):
+        rows += [{**row, 'digest': digests[row['sequence']]} for row in part]
+        write_json(path, {'rows': rows})
+        progress(count, len(tasks))
+    return sorted(rows, key=lambda row: (row['sequence'], row['later']))
+
+
+def _digest(stream: Stream, *settings: object) -> str:
+    """Return a digest of all that the rows of a sequence depend on."""
+    return digest_of(json.dumps([*map(repr, settings), stream.digest,
+                                 code_digest(*_CODE)]).encode())
+
+
+def _finished(path: Path) -> list[Row]:
+    """Return the rows of an earlier run; none where there are none, or not of this form."""
     try:
         known = reading.read_json(path) if path.is_file() else None
     except FileError:
         known = None
-    if isinstance(known, dict) and known.get('digest') == digest:
-        found: list[Row] = known['rows']
-        return found
-    tasks = [task for stream in streams
-             for task in poster_tasks(stream, config, lcd, checks, labels)]
-    rows: list[Row] = []
-    for done, part in enumerate(run(run_pair, tasks), 1):
-        rows += part
-        progress(done, len(tasks))
-    rows.sort(key=lambda row: (row['sequence'], row['later']))
-    write_json(path, {'digest': digest, 'rows': rows})
-    return rows
+    rows = known.get('rows') if isinstance(known, dict) else None
+    return [row for row in rows if isinstance(row, dict) and {'digest', 'sequence', 'later'}
+            <= set(row)] if isinstance(rows, list) else []
 
 
 def measured_prices(streams: Sequence[Stream], cells: Sequence[Cell],
