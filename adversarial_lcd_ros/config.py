@@ -265,7 +265,7 @@ class AttackConfig(Config):
         'svm_rbf', 'Stepwise: model that predicts the attack loss of a perturbed graph.',
         choices=SURROGATES)
     retry: str = setting(
-        'never', 'Stepwise: what becomes of flips that were asked about and not chosen. never: '
+        'gained', 'Stepwise: what becomes of flips that were asked about and not chosen. never: '
         'they are not asked about again; gained: those that gained are; set: the same as never, '
         "but the best three are chosen at once, after three edits' worth of queries.",
         choices=RETRIES)
