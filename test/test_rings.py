@@ -199,7 +199,7 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
         'stepwise', 'recall', 'optimum', 'move_nodes', 'replay'}
     defences = {dict(cell.detector).get('defences', 'none') for cell in cells}
     assert defences == {'none', 'rederive', 'length_check', 'geometric_check',
-                        'rederive, length_check, geometric_check'}
+                        'common_part', 'rederive, length_check, geometric_check'}
     for named in defences:
         searches = {cell.search for cell in cells if cell.aware
                     and dict(cell.detector).get('defences', 'none') == named}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
 from adversarial_lcd_ros.evaluation.store import Row
@@ -30,7 +31,7 @@ def ring_of(row: Mapping[str, Any]) -> str:
 def defence_title(row: Mapping[str, Any]) -> str:
     """Return the defences of a row in words."""
     words = [row['detector']] if row['detector'] else []
-    if row['threshold'] != 0.5:
+    if row['threshold'] != LcdConfig.threshold:
         words.append(f'threshold {row["threshold"]:g}')
     return ', '.join(words) or 'none'
 
