@@ -134,3 +134,45 @@ def test_the_report_of_the_folder_is_made_anew_from_its_cells(tmp_path, command,
     assert report.read_bytes() == before
     assert main(['inspect', str(tmp_path / 'out')]) == 0
     assert 'Decline in balanced accuracy on walk' in capsys.readouterr().out
+
+
+RINGS = """
+protocol: rings
+seeds: 1
+frames: 2
+defaults: {nodes: 30, surrogate: none, target: wl}
+attacks:
+  - search: [recall, move_nodes, replay]
+    ratio: 0.01
+    detector: [{}, {defences: rederive}]
+posters:
+  pairs: 2
+  shares: [0.1, 0.3]
+  kinds: [cells, noise]
+  targets: [wl]
+  checks: {check: {defences: geometric_check}}
+"""
+
+
+def test_the_rings_are_run_reported_and_gone_on_with(tmp_path, command, capsys):
+    (tmp_path / 'mine.yaml').write_text(RINGS)
+    assert command() == 0
+    page = (tmp_path / 'out' / 'rings.md').read_text()
+    assert str(tmp_path / 'out' / 'rings.md') in capsys.readouterr().out
+    summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert summary['kind'] == 'rings'
+    assert {(row['search'], row['defence']) for row in summary['rows']} == {
+        (search, defence) for search in ('recall', 'move_nodes', 'replay')
+        for defence in ('none', 'defences rederive')}
+    # Edges that are made again cannot be attacked.
+    assert all(row['decline_pp'] == 0 for row in summary['rows']
+               if (row['search'], row['defence']) == ('recall', 'defences rederive'))
+    # No poster, two sizes, another texture, two posters, a control; a check or none.
+    assert len(summary['posters']) == 6 * 2
+    assert {row['pairs'] for row in summary['posters']} == {2}
+    assert {entry['defence'] for entry in summary['prices']} == {'none', 'defences rederive'}
+    assert main(['report', str(tmp_path / 'out')]) == 0
+    assert (tmp_path / 'out' / 'rings.md').read_text() == page
+    hung = (tmp_path / 'out' / 'posters.json').read_bytes()
+    assert command() == 0
+    assert (tmp_path / 'out' / 'posters.json').read_bytes() == hung

@@ -94,10 +94,12 @@ def run(options: Namespace) -> None:
             tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
                  'there')
             raise
-        write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
         path, recipe = read_recipe(options.recipe)
-        report = (_rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
-                  if recipe['protocol'] == RINGS else write_paper_report(folder, rows))
+        if recipe['protocol'] == RINGS:
+            report = _rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
+        else:
+            write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
+            report = write_paper_report(folder, rows)
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
         return
@@ -107,7 +109,9 @@ def run(options: Namespace) -> None:
 def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
            rows: list[Row], posters: tuple[Path, Any]) -> Path:
     """Hang the posters of a recipe, measure what defences cost, write the page."""
-    from adversarial_lcd_ros.evaluation.rings.posters import poster_config
+    from adversarial_lcd_ros.evaluation.pictures import write_pictures
+    from adversarial_lcd_ros.evaluation.rings.pictures import ring_pictures
+    from adversarial_lcd_ros.evaluation.rings.posters import PairTask, poster_config, poster_tasks
     from adversarial_lcd_ros.evaluation.rings.report import (
         measured_prices,
         run_posters,
@@ -115,12 +119,17 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     )
 
     lcd = config_from_options(options, LcdConfig)
+    labels = config_from_options(options, LabelConfig)
     declared: list[Row] = []
+    tasks: list[PairTask] = []
     if posters[1] is not None:
         config, checks = poster_config(posters[1], posters[0])
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared = run_posters(folder, streams, config, checks, lcd,
-                                   config_from_options(options, LabelConfig), workers, progress)
+            declared = run_posters(folder, streams, config, checks, lcd, labels, workers,
+                                   progress)
+        tasks = [task for stream in streams
+                 for task in poster_tasks(stream, config, lcd, checks, labels)]
+    write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
 
 

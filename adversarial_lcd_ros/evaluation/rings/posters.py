@@ -134,7 +134,7 @@ def poster_tasks(stream: Stream, config: PosterConfig, lcd: LcdConfig,
     known, tasks = stream.labels, list[PairTask]()
     for later in rng.permutation(len(known.kind)).tolist():
         apart = known.elsewhere[later, :known.candidates[later]]
-        near = np.convolve(apart, np.ones(3), 'valid') == 3
+        near = apart[:-2] & apart[1:-1] & apart[2:]
         if near.any():
             earlier = int(rng.choice(np.flatnonzero(near))) + 1
             tasks.append(PairTask(
@@ -150,9 +150,7 @@ def run_pair(task: PairTask) -> list[Row]:
     """Return a row for every condition, target and check of a pair."""
     with threadpool_limits(1), GraphBuilder(task.graphs.builder) as builder:
         graphs = load_stream_graphs(task.graphs)
-        scene = Scene.read(task.graphs.source, graphs,
-                           ((task.earlier, task.earlier - 1, task.earlier + 1), (task.later,)),
-                           task.focal, task.seed)
+        scene = scene_of(task, graphs)
         rows: list[Row] = []
         for condition in task.conditions:
             posted, on_wall = scene.posted(condition)
@@ -164,6 +162,18 @@ def run_pair(task: PairTask) -> list[Row]:
                      'control': condition.control, 'on_wall': on_wall}
             rows += [{**about, **row} for row in _judged(task, graphs, made)]
     return rows
+
+
+def scene_of(task: PairTask, graphs: Sequence[MultiTierGraph]) -> Scene:
+    """Return the frames of a pair."""
+    return Scene.read(task.graphs.source, graphs,
+                      ((task.earlier, task.earlier - 1, task.earlier + 1), (task.later,)),
+                      task.focal, task.seed)
+
+
+def condition_of(row: Row) -> Condition:
+    """Return what hung in the places of a row."""
+    return Condition(row['kind'], row['share'], row['count'], row['control'])
 
 
 def _judged(task: PairTask, graphs: Sequence[MultiTierGraph],

@@ -11,7 +11,8 @@ from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.errors import FileError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
-from adversarial_lcd_ros.evaluation.results import SUMMARY, summary_document
+from adversarial_lcd_ros.evaluation.pictures import read_pictures
+from adversarial_lcd_ros.evaluation.results import PICTURES, SUMMARY, summary_document
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
 from adversarial_lcd_ros.evaluation.rings.posters import (
@@ -115,5 +116,7 @@ def write_page(folder: Path, summary: Mapping[str, Any], command: str = '') -> P
     """Write rings.md and its curves from the content of summary.json; return the page's path."""
     write_bytes(folder / CURVES, ring_curves(summary))
     path = folder / PAGE
-    write_text(path, rings_page(summary, command) + f'\n![curves]({CURVES})\n')
+    shown = ''.join(f'\n![{title}]({PICTURES}/{number:02d}.jpg)\n\n*{title}. {caption}*\n'
+                    for number, (title, caption, _) in enumerate(read_pictures(folder), 1))
+    write_text(path, f'{rings_page(summary, command)}\n![curves]({CURVES})\n{shown}')
     return path
