@@ -125,7 +125,7 @@ def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
     assert (first.nodes, first.lcd.min_gap_s, first.lcd.candidates) == ((100, 300), 3.0, 3)
     assert (second.targets, second.nodes, second.lcd.min_gap_s) == (('vbow',), (300,), 8.0)
     two.write_text('sequences:\n  - {source: b, target: vbow}\n')
-    with pytest.raises(ConfigError, match='unknown key target; there are: source'):
+    with pytest.raises(ConfigError, match=r'unknown key target.*; there are: source'):
         recipe_sequences(str(two), tmp_path, NOTHING)
     with pytest.raises(ConfigError, match='there is no folder'):
         recipe_sequences('target', tmp_path / 'nowhere', NOTHING)

@@ -148,8 +148,8 @@ def pairs_to_look_at(labels: FrameLabels, position: NDArray[np.float64],
                        'scale': labels.scaled[frame, old]}.get(kind)
             among = old if fitting is None else old[fitting]
             apart = np.linalg.norm(place[among] - place[frame], axis=1)
-            nearest = np.argmax(apart) if kind == 'scale' else np.argmin(apart)
-            chosen.append((kind, frame, int(among[nearest])))
+            telling = np.argmax(apart) if kind == 'scale' else np.argmin(apart)
+            chosen.append((kind, frame, int(among[telling])))
     return chosen
 
 
