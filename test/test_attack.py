@@ -21,7 +21,6 @@ from adversarial_lcd_ros.attack.oracle import (
 )
 from adversarial_lcd_ros.attack.perturbations import PERTURBATIONS, Allowed, make_perturbation
 from adversarial_lcd_ros.attack.perturbations.eigencentrality import eigencentrality
-from adversarial_lcd_ros.attack.searches import SEARCHES
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
 from adversarial_lcd_ros.attack.surrogates import make_surrogate
 from adversarial_lcd_ros.config import AttackConfig
@@ -195,7 +194,7 @@ def test_shortest_path_cuts_or_joins():
 @pytest.mark.parametrize('settings', [
     *({'perturbation': name, 'surrogate': surrogate} for name in PERTURBATIONS
       for surrogate in ('svm_rbf', 'none')),
-    *({'search': name} for name in SEARCHES if name != 'stepwise')], ids=str)
+    {'search': 'recall'}, {'search': 'grabnel'}], ids=str)
 def test_an_attack_keeps_to_its_budgets(settings):
     config = AttackConfig(**settings, ratio=1e-3, queries_per_edit=12)
     detector = SecretDetector(GRAPH, start=50.0)
