@@ -193,6 +193,8 @@ def test_maps_are_made_once_reported_and_shown(folder, capsys):
     page = (folder / 'report.html').read_text()
     assert 'What it does to the map' in page
     assert page.count('Under forger') == 1
+    assert main(['report', str(folder / 'map')]) == 0
+    assert '| forger |' in (folder / 'map' / 'tables.md').read_text()
     capsys.readouterr()
     assert main(['inspect', str(folder / 'map')]) == 0
     assert 'Absolute error in metres, young map, 29 frames' in capsys.readouterr().out

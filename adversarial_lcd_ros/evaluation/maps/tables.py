@@ -78,6 +78,17 @@ def run_tables(summary: Mapping[str, Any]) -> list[Table]:
     return list(_runs(summary['rows']))
 
 
+def markdown(tables: Sequence[Table]) -> str:
+    """Return tables as Markdown, for a page."""
+    parts = []
+    for title, rows in tables:
+        heads = list(rows[0])
+        lines = [heads, ['---'] * len(heads), *([row[head] for head in heads] for row in rows)]
+        parts.append(f'### {title}\n\n' + ''.join(f'| {" | ".join(line)} |\n'
+                                                  for line in lines))
+    return '\n'.join(parts)
+
+
 def _runs(rows: Sequence[Row]) -> Iterator[Table]:
     main = [row for row in rows if is_main(row)]
     for stage in dict.fromkeys(row['stage'] for row in main):
