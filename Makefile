@@ -21,7 +21,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCHABLE := $(VENV)/.benchable
 COMPILED := $(VENV)/.compiled
-NODES := attacker bag_replay graph_builder lcd viewer
+NODES := attacker bag_replay graph_builder lcd map_builder viewer
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 # Every release by its digest, from a lock that is complete. What comes as source is built by the
 # setuptools of the lock, too.

@@ -18,7 +18,7 @@ except ImportError:  # before setuptools 70.1
         bdist_wheel = None
 
 PACKAGE = 'adversarial_lcd_ros'
-NODES = ('attacker', 'bag_replay', 'graph_builder', 'lcd', 'viewer')
+NODES = ('attacker', 'bag_replay', 'graph_builder', 'lcd', 'map_builder', 'viewer')
 # Executable to the module and function that it calls.
 EXECUTABLES = {'adversarial-lcd': 'cli:main', **{node: f'start:{node}' for node in NODES}}
 SHARED_FOLDERS = ('launch', 'config', 'msg_schemas', 'bags')

@@ -546,3 +546,40 @@ class BagReplayNodeConfig(Config):
         'empty: none.')
     record_frames: bool = setting(
         True, 'Record what is replayed, too: camera frames, poses, detections.')
+
+
+@dataclass(frozen=True)
+class MapBuilderNodeConfig(Config):
+    """The map_builder node: decisions and odometry to a map (docs/map.md)."""
+
+    title: ClassVar[str] = 'map_builder node'
+
+    back_end: str = setting(
+        'cauchy', 'What makes the map, frame by frame (iSAM2): gnc needs all frames at once.',
+        choices=BACK_ENDS[:3])
+    odometry: str = setting(
+        'topic', 'Where the odometry is from: the topic odom, or the topic ground_truth with '
+        'drift (truth).', choices=('topic', 'truth'))
+    drift: float = setting(
+        1.0, 'Odometry truth: errors, as a multiple of those of the command "map".',
+        low=0.0, high=1e3)
+    odometry_tolerance_s: float = setting(
+        0.05, 'Largest offset in time between a decision and its odometry, seconds.',
+        low=0.0, high=1e3)
+    step_rotation_deg: float = setting(
+        0.3, 'What the map takes the error of the odometry from frame to frame for, about each '
+        'axis, degrees.', low=1e-3, high=180.0)
+    step_translation_m: float = setting(
+        0.01, 'And along each axis, metres.', low=1e-6, high=1e3)
+    closure_rotation_deg: float = setting(
+        5.0, 'A closure claims that the camera is where it was: within so much about each axis, '
+        'degrees.', low=1e-3, high=180.0)
+    closure_translation_m: float = setting(
+        0.2, 'And along each axis, metres.', low=1e-6, high=1e3)
+    max_poses: int = setting(
+        20_000, 'Most poses of a map; decisions beyond are counted and left out.', low=2,
+        high=1_000_000)
+    map_frame: str = setting('map', 'Name of the frame that the map is in.')
+    odom_frame: str = setting(
+        'odom', 'Name of the frame that the odometry is in, where its messages have none.')
+    seed: int = setting(42, 'Odometry truth: seed of its errors.', low=0, high=2**31 - 1)

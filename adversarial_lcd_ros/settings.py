@@ -31,6 +31,7 @@ from adversarial_lcd_ros.config import (
     LabelConfig,
     LcdConfig,
     LcdNodeConfig,
+    MapBuilderNodeConfig,
     MapConfig,
     MessageLimits,
     ReplayConfig,
@@ -47,6 +48,7 @@ NODE_CONFIGS: Mapping[str, tuple[type[Config], ...]] = {
     'attacker': (AttackConfig, AttackerNodeConfig, MessageLimits),
     'bag_replay': (ReplayConfig, BagReplayNodeConfig),
     'viewer': (MessageLimits,),
+    'map_builder': (MapBuilderNodeConfig, MessageLimits),
 }
 # The sections of a settings file.
 SECTIONS: Mapping[str, tuple[type[Config], ...]] = {

@@ -197,6 +197,11 @@ def lcd() -> int:
     return run_node_process('lcd')
 
 
+def map_builder() -> int:
+    """Be the node map_builder."""
+    return run_node_process('map_builder')
+
+
 def viewer() -> int:
     """Be the node viewer."""
     return run_node_process('viewer')

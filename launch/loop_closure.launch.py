@@ -43,16 +43,18 @@ PARAMETERS = {
             'hard_answers': boolean},
     'attacker': {'mode': str, 'search': str, 'perturbation': str, 'surrogate': str,
                  'ratio': float, 'max_queries': int, 'deadline_ms': float, 'seed': int},
+    'map_builder': {'back_end': str, 'odometry': str, 'drift': float},
     'bag_replay': {'bag': found, 'lockstep': boolean, 'window': int, 'rate': float,
                    'stride': int, 'start_s': float, 'duration_s': float, 'loop': int,
                    'clock': boolean, 'record': str},
 }
-CHOICES = {'attack': [*BOOLEANS], 'view': [*BOOLEANS], 'use_sim_time': [*BOOLEANS]} | {
+CHOICES = {name: [*BOOLEANS] for name in ('attack', 'view', 'map', 'use_sim_time')} | {
     name: ['', *BOOLEANS] for taken in PARAMETERS.values() for name, read in taken.items()
     if read is boolean}
 ARGUMENTS = {
     'attack': ('false', 'Put the attacker between graph_builder and lcd.'),
     'view': ('false', 'Draw a picture of each decision on view/compressed.'),
+    'map': ('false', 'Build the map that the closures make, on path and /tf.'),
     'image': ('image', 'Camera topic; compressed frames on <image>/compressed.'),
     'params_file': (str(SHARE / 'config' / 'params.yaml'), 'Parameters of the nodes.'),
     'namespace': ('', 'Namespace of nodes and topics.'),
@@ -75,6 +77,8 @@ def start(context):
         nodes.append('attacker')
     if BOOLEANS[given['view']]:
         nodes.append('viewer')
+    if BOOLEANS[given['map']]:
+        nodes.append('map_builder')
     if given['bag']:
         nodes.append('bag_replay')
     profile = given['dds_profile'] and found(given['dds_profile'])

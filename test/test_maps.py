@@ -4,6 +4,7 @@ import json
 import sys
 
 import bag_factory as make
+import cv2
 from map_factory import wavy
 import numpy as np
 import pytest
@@ -193,6 +194,8 @@ def test_maps_are_made_once_reported_and_shown(folder, capsys):
     page = (folder / 'report.html').read_text()
     assert 'What it does to the map' in page
     assert page.count('Under forger') == 1
+    assert main(['report', str(folder / 'map')]) == 0
+    assert '| forger |' in (folder / 'map' / 'tables.md').read_text()
     capsys.readouterr()
     assert main(['inspect', str(folder / 'map')]) == 0
     assert 'Absolute error in metres, young map, 29 frames' in capsys.readouterr().out
@@ -234,3 +237,58 @@ def test_a_missing_gtsam_is_told_before_anything_is_replayed(monkeypatch, capsys
     assert 'adversarial_lcd_ros[slam]' in said
     assert said.count('\n') == 1
     assert not list(tmp_path.iterdir())
+
+
+@needs_gtsam
+@pytest.mark.parametrize('suffix', ['gif', 'mp4'])
+def test_a_map_is_shown_as_it_grows(folder, tmp_path, capsys, suffix):
+    out = tmp_path / 'films' / f'map.{suffix}'
+    assert main(['render', str(folder), '--output', str(out), '--steps', '3', '--seconds', '2',
+                 '--jobs', '1']) == 0
+    assert capsys.readouterr().out == f'{out}\n'
+    assert [path.name for path in out.parent.iterdir()] == [out.name]
+    film = cv2.VideoCapture(str(out))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) >= 3
+    found, picture = film.read()
+    assert found
+    assert picture.std() > 1
+
+
+@needs_gtsam
+def test_maps_that_are_there_are_drawn_side_by_side(tmp_path, capsys):
+    folder, still = replayed(tmp_path), tmp_path / 'map.png'
+    assert main(['render', str(folder), '--output', str(still)]) == 2
+    assert 'adversarial-lcd map' in capsys.readouterr().err
+    make_maps(folder, MapConfig(draws=1), here)
+    assert main(['render', str(folder), '--output', str(still)]) == 0
+    # Two runs by odometry and four back ends.
+    assert cv2.imread(str(still)).shape[1] > 500
+
+
+@pytest.mark.parametrize(('options', 'said'), [
+    (['--output', 'map.avi'], '.gif, .mp4, .png, .svg'), (['--steps', '0'], '--steps 0'),
+    (['--jobs', '0'], '--jobs 0')])
+def test_wrong_options_of_render_are_told(folder, capsys, options, said):
+    assert main(['render', str(folder), *options]) == 2
+    found = capsys.readouterr().err
+    assert said in found
+    assert found.count('\n') == 1
+
+
+@needs_gtsam
+def test_a_run_that_is_not_there_is_told(folder, capsys):
+    assert main(['render', str(folder), '--run', 'nobody', '--jobs', '1']) == 2
+    assert 'clean, forger' in capsys.readouterr().err
+
+
+@needs_gtsam
+def test_claims_by_features_are_refused_where_the_attack_changed_them(folder, tmp_path):
+    copy = tmp_path / 'copy'
+    copy.mkdir()
+    for path in folder.glob('*.*'):
+        (copy / path.name).write_bytes(path.read_bytes())
+    document = json.loads((copy / 'configuration.json').read_text())
+    document['settings'][-1]['values']['poster'] = 'cells'
+    (copy / 'configuration.json').write_text(json.dumps(document))
+    with pytest.raises(EvaluationError, match='the attack changed features'):
+        make_maps(copy, MapConfig(false_claim='essential', draws=1), here)

@@ -67,7 +67,8 @@ def add_render(commands: Commands) -> None:
                         metavar='RESULTS', help='results folder of a replay (default: '
                         '%(default)s)')
     parser.add_argument('--output', type=Path, default=Path('map.gif'), metavar='FILE',
-                        help='.gif or .mp4 (default: %(default)s)')
+                        help='.gif or .mp4; .png or .svg: no '
+                        'animation, the maps that "map" made (default: %(default)s)')
     parser.add_argument('--run', metavar='NAME', dest='shown', help='"clean" or the name of an '
                         'attack (default: the run with the most false closures)')
     parser.add_argument('--seconds', type=float, default=0.0, metavar='X', help='of the sequence '
@@ -138,13 +139,21 @@ def _processes(jobs: int | None) -> int:
 
 
 def _render(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.maps.animation import animate
+    from adversarial_lcd_ros.evaluation.maps.animation import FORMATS, animate
+    from adversarial_lcd_ros.evaluation.maps.report import FOLDER, STILLS, draw_still
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
     if options.steps < 1 or options.seconds < 0:
         raise ConfigError(f'--steps {options.steps}, --seconds {options.seconds:g}: expected 1 or '
                           'more, and 0 or more')
+    if options.output.suffix not in (*FORMATS, *STILLS):
+        raise ConfigError(f'--output {options.output}: expected a name that ends in '
+                          f'{", ".join((*FORMATS, *STILLS))}')
     _open_replay(options.folder)
+    if options.output.suffix in STILLS:
+        draw_still(options.folder / FOLDER, options.output)
+        print(options.output)
+        return
     with _Bars() as bars, local_workers(_processes(options.jobs)) as workers:
         animate(options.folder, options.output, config_from_options(options, MapConfig), workers,
                 run=options.shown, steps=options.steps, seconds=options.seconds,

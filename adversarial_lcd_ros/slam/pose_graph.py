@@ -19,7 +19,7 @@ from adversarial_lcd_ros.slam.motions import Motions, chained
 from adversarial_lcd_ros.slam.odometry import Odometry
 
 # The first pose is where it is: without it nothing says where the map lies.
-_ANCHOR_SIGMA = 1e-4
+ANCHOR_SIGMA = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def factors_of(pose_graph: PoseGraph, robust: Callable[[Any], Any] = lambda nois
     if anchored:
         graph.add(library.PriorFactorPose3(
             0, library.Pose3(pose_graph.start),
-            library.noiseModel.Isotropic.Sigma(6, _ANCHOR_SIGMA)))
+            library.noiseModel.Isotropic.Sigma(6, ANCHOR_SIGMA)))
     odometry, closures = pose_graph.odometry, pose_graph.closures
     for number, (step, sigma) in enumerate(zip(odometry.steps, odometry.sigma, strict=True)):
         graph.add(library.BetweenFactorPose3(number, number + 1, library.Pose3(step),

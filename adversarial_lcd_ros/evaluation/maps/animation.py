@@ -68,11 +68,9 @@ def animate(folder: Path, output: Path, config: MapConfig, workers: Run, *, run:
     Raises
     ------
     ConfigError
-        The format or the run is not known.
+        The run is not known, or gtsam is missing.
 
     """
-    if output.suffix not in FORMATS:
-        raise ConfigError(f'{output}: expected a name that ends in {" or ".join(FORMATS)}')
     gtsam()
     inputs = read_inputs(folder, str(read_json(folder / SUMMARY)['sequence']), source)
     run = run or max(inputs.runs, key=lambda name: int(inputs.runs[name].pairs.is_false.sum()))

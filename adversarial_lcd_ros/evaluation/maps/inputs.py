@@ -28,6 +28,7 @@ from adversarial_lcd_ros.ground_truth.labels import (
     ELSEWHERE,
     POSITIVE,
     RIGHT,
+    FrameLabels,
     located_poses,
 )
 from adversarial_lcd_ros.registry import NONE
@@ -151,18 +152,22 @@ def read_inputs(folder: Path, name: str, source: str | None = None, *, labelled:
         raise EvaluationError(f'{source}: {len(frame)} frames with a ground truth pose: expected '
                               f'{LEAST_FRAMES} or more for a map')
     loops = np.flatnonzero(column(clean, 'label')[frame] == POSITIVE)
-    elsewhere = None
-    if labelled:
-        labels = label_views(views, config, progress).labels
+    labels = label_views(views, config, progress).labels if labelled else None
+    if labels is not None:
         _check_same([record.kind for record in clean], labels.names, source)
-        old = np.arange(len(located))[None, :] < labels.candidates[:, None]
-        elsewhere = (labels.elsewhere & old)[np.ix_(frame, frame)]
     has_poster = any(section['values'].get('poster', NONE) != NONE
                      for section in configuration.get('settings', ()))
     return MapInputs(
         name, source, frame, views.stamp_ns[frame], of_trajectory(poses)[frame],
         {run: _declared(rows, frame, has_poster) for run, rows in records.items()},
-        elsewhere, int(loops[0]) if len(loops) else None, focal_px)
+        None if labels is None else _elsewhere(labels, frame),
+        int(loops[0]) if len(loops) else None, focal_px)
+
+
+def _elsewhere(labels: FrameLabels, frame: NDArray[np.int64]) -> NDArray[np.bool_]:
+    old = np.arange(len(labels.candidates))[None, :] < labels.candidates[:, None]
+    pairs: NDArray[np.bool_] = (labels.elsewhere & old)[np.ix_(frame, frame)]
+    return pairs
 
 
 def section_of(configuration: Mapping[str, Any], kind: type[ConfigT]) -> ConfigT:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import io
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from adversarial_lcd_ros.evaluation.maps.summary import KIND, SCHEMA
 from adversarial_lcd_ros.evaluation.maps.tables import (
     all_tables,
     is_main,
+    markdown,
     metres,
     run_title,
     stage_title,
@@ -32,9 +34,10 @@ from adversarial_lcd_ros.evaluation.results import (
     read_json,
 )
 from adversarial_lcd_ros.evaluation.store import Row, read_cells
-from adversarial_lcd_ros.files.writing import write_text
+from adversarial_lcd_ros.files.writing import write_bytes, write_text
 
-FOLDER = 'map'  # in a results folder of a replay
+STILLS, _STILL_DPI = ('.png', '.svg'), 100
+FOLDER, TABLES = 'map', 'tables.md'  # in a results folder of a replay, and in that
 
 
 def map_sections(folder: Path) -> list[str]:
@@ -53,7 +56,7 @@ def map_sections(folder: Path) -> list[str]:
 
 def report_maps(folder: Path) -> Path:
     """
-    Write report.html of a folder of maps anew from what is in it; return its path.
+    Write report.html and tables.md of a folder of maps anew; return the path of the report.
 
     Raises
     ------
@@ -66,6 +69,7 @@ def report_maps(folder: Path) -> Path:
         configuration=read_json(folder / CONFIGURATION),
         environment=read_json(folder / ENVIRONMENT))
     write_text(folder / REPORT, page)
+    write_text(folder / TABLES, markdown(all_tables(read_json(folder / SUMMARY))))
     return folder / REPORT
 
 
@@ -112,6 +116,35 @@ def shown_maps(folder: Path, summary: Mapping[str, Any], stage: str) -> list[Sho
     drawn = dict.fromkeys([(CLEAN, False), (worst, False), (worst, True)])
     return [Shown(run_title(cases[key]), CHECKED_COLOUR if key[1] else
                   colour_of(names.index(key[0])), cases[key]) for key in drawn if key in cases]
+
+
+def draw_still(folder: Path, output: Path) -> None:
+    """
+    Write the maps of a folder side by side, young ones where there are any.
+
+    Parameters
+    ----------
+    folder : Path
+        Of maps that were made.
+    output : Path
+        .png or .svg.
+
+    Raises
+    ------
+    EvaluationError
+        There are no maps.
+
+    """
+    if not (folder / SUMMARY).is_file():
+        raise EvaluationError(f'{folder} has no maps: make them with "adversarial-lcd map '
+                              f'{folder.parent}"')
+    summary = read_json(folder / SUMMARY)
+    shown = (shown_maps(folder, summary, YOUNG) or shown_maps(folder, summary, WHOLE))
+    stream = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        plots.draw_paths(shown).savefig(stream, format=output.suffix[1:], dpi=_STILL_DPI)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(output, stream.getvalue())
 
 
 def worst_run(summary: Mapping[str, Any]) -> str:

@@ -31,6 +31,11 @@ def with_interval(value: float | None, bounds: Sequence[float] | None) -> str:
     return f'{metres(value)} ± {metres((bounds[1] - bounds[0]) / 2)}'
 
 
+def count(value: float) -> str:
+    """Return a mean of counts, without decimals where all draws had as many."""
+    return number(value, 0) if value == round(value) else mean_count(value)
+
+
 def stage_title(row: Mapping[str, Any]) -> str:
     """Return which part of the run a map is of."""
     return f'{STAGE_TITLES[row["stage"]]}, {row["frames"]} frames'
@@ -78,6 +83,17 @@ def run_tables(summary: Mapping[str, Any]) -> list[Table]:
     return list(_runs(summary['rows']))
 
 
+def markdown(tables: Sequence[Table]) -> str:
+    """Return tables as Markdown, for a page."""
+    parts = []
+    for title, rows in tables:
+        heads = list(rows[0])
+        lines = [heads, ['---'] * len(heads), *([row[head] for head in heads] for row in rows)]
+        parts.append(f'### {title}\n\n' + ''.join(f'| {" | ".join(line)} |\n'
+                                                  for line in lines))
+    return '\n'.join(parts)
+
+
 def _runs(rows: Sequence[Row]) -> Iterator[Table]:
     main = [row for row in rows if is_main(row)]
     for stage in dict.fromkeys(row['stage'] for row in main):
@@ -92,8 +108,8 @@ def _kept(rows: Sequence[Row]) -> Iterator[Table]:
         table = [{'run': run, 'back end': BACK_END_TITLES[row['back_end']],
                   'error more than clean': with_interval(row['excess_m'], row['excess_ci95'])
                   if run != CLEAN else '',
-                  'right kept': f'{mean_count(row["right_kept"])} of {mean_count(row["right"])}',
-                  'false kept': f'{mean_count(row["false_kept"])} of {mean_count(row["false"])}',
+                  'right kept': f'{count(row["right_kept"])} of {count(row["right"])}',
+                  'false kept': f'{count(row["false_kept"])} of {count(row["false"])}',
                   'relative error, m': metres(row['rpe_m']),
                   'degrees': number(row['rpe_deg'], 2),
                   'seconds': number(row['duration_s'], 2)}
@@ -145,7 +161,7 @@ def _grouped(rows: Sequence[Row], *names: str) -> list[list[Row]]:
 
 
 def _closures(of: Sequence[Row]) -> str:
-    return f'{mean_count(of[0]["right"])} / {mean_count(of[0]["false"])}'
+    return f'{count(of[0]["right"])} / {count(of[0]["false"])}'
 
 
 def _errors(of: Sequence[Row]) -> dict[str, str]:
