@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Which nodes of a multi-tier graph are joined (paper, Fig. 2 c).
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Errors that a user can act on: what was found, what was expected, what to do."""
 
 from collections.abc import Iterable

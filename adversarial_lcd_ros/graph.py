@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The multi-tier graph of a view, immutable, as a struct of numpy arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Where the files that travel with the package, and those it provisions, are found."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How a search, a perturbation or a surrogate appears in reports: facts on its class."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Camera image to graph: by stage, and with two frames under way."""
 
 from collections import deque

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Eigenvector centrality from scratch, and after a flip."""
 
 import networkx as nx

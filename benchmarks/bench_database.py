@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Candidates and decision among up to a hundred thousand keyframes."""
 
 from dataclasses import replace

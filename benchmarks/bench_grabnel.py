@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """GRABNEL (Wan et al., 2021) beside the paper's search and ours: same target, same queries."""
 
 import time

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The hop through the man in the middle, and the whole pipeline in lockstep, between processes."""
 
 from contextlib import contextmanager

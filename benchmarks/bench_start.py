@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Start to ready of each node: processor time with compiled code from the cache, and without."""
 
 import os

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The recipe of the paper on one sequence: where its time goes, and how it grows."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Scoring every single flip of a graph: WL kernel, WL features, and the target itself."""
 
 import networkx as nx

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What benchmarks share: real graphs, and a record of each against its rival."""
 
 from datetime import datetime, timezone

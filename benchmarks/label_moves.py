@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 What another rule of labels moves: frames by kind, and a detector's matches by verdict.
 

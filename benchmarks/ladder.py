@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The ladder of docs/threats.md as one picture: who can do what, what stops it, what stops that.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A bare relay: what the man in the middle costs is measured beside it."""
 
 import sys

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 How large the rooms of the package are, before and now: python benchmarks/rooms.py COMMIT.
 

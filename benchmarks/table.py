@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Put the rows of results.json as a table into docs/results: python -m benchmarks.table."""
 
 import json

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attack the first frames of the embedded tour; the last is the one on the README's first page."""
 
 from adversarial_lcd_ros import AttackConfig, Attacker, LoopClosureDetector, open_graphs

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What an attack takes off the balanced accuracy of a stretch of the tour, without ROS."""
 
 import numpy as np

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Build a graph from an image: the first frame of the embedded tour, or a picture of one's own."""
 
 import sys

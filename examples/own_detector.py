@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attack a detector of one's own: any callable that says how sure it is, or just yes or no."""
 
 from adversarial_lcd_ros import AttackConfig, Attacker, MultiTierGraph, open_graphs

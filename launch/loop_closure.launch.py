@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The pipeline: graph_builder and lcd, with a man in the middle if told so, and a bag if given one.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Renew the lock files beside this script, and say what changed.
 

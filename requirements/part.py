@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Print the lines of a lock file that belong to some distributions: ``part.py LOCK NAME ...``."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """``python -m soak``: run all faults and write docs/reliability.md (make soak)."""
 
 from __future__ import annotations

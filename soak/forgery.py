@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Graphs that were forged, changed, cut, replayed or reordered, at the gate of sealed ones."""
 
 from __future__ import annotations

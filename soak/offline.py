@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Faults that need no node: payloads, files, recordings."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What came of a fault, and how memory went meanwhile."""
 
 from __future__ import annotations

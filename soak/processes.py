@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Faults of whole commands: a full disk, kill -9, two at once."""
 
 from __future__ import annotations

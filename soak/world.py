@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A node in a process of its own, and a probe of ours that speaks and listens to it."""
 
 from __future__ import annotations

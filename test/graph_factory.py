@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Graphs for tests: small ones to compute by hand, random ones for invariants."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Tiny recordings in the layouts of published data sets, for tests."""
 
 import bag_factory as make

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Defences of a user's own, by what they do: the tests name them as own_defences:Class."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A finished results folder of every kind, from made-up decisions."""
 
 from paper_factory import make_row

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ROS in one process: a context, an executor and nodes of its own for each test."""
 
 import os

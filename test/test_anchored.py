@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The object-anchored target by hand: what counts, how much, and what does not."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The attack: budgets enforced, nothing else changed, same seed same bytes."""
 
 from dataclasses import replace

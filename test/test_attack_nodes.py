@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attacks on nodes: moved features and replayed graphs, their budgets and what is counted."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recall: which edges it replays and erases, what it learns from answers, what it spends."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Stepwise search: what becomes of flips that were asked about, and controls with a known end."""
 
 from graph_factory import graphs, make_graph

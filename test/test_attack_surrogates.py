@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Surrogates: each learns which flips gain, by soft answers and by hard ones."""
 
 from dataclasses import replace

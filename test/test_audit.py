@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Labels by what can be shown: rooms made by hand, seen by cameras whose poses are known."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd build: graphs into a bag, complete or not there; evaluated like images."""
 
 import json

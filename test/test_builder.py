@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The graph builder: edges by the rules of the paper, what a frame may be, that it repeats."""
 
 from itertools import combinations

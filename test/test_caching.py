@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Compiled code: kept where it can be, and all of it there before the first real graph."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Certificates: no flips that anybody finds lead beyond their bounds."""
 
 from dataclasses import replace

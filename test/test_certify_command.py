@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The command "certify": which decisions of a sequence no few flips can turn over."""
 
 from contextlib import contextmanager

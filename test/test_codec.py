@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Payloads: exact round trip, and nothing that is damaged gets through."""
 
 from dataclasses import replace

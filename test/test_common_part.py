@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The share of features in what two views could have in common, by hand."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Settings: checked on construction, the same on the command line, in files and in nodes."""
 
 from argparse import ArgumentParser

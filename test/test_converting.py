@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings as other readers of MCAP see them, and as Foxglove's layout expects them."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bags that others wrote, edited or cut: read where they are whole, else the true reason."""
 
 import shutil

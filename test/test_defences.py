@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Defences that ship: what each lets through, and what not."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Objects of the user's own detector: the CSV, the message, their way into the graph."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the pages say is there: links, anchors, commands, options, and what can be computed."""
 
 from functools import cache

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pictures of graphs: size, colours of what was flipped, what is refused."""
 
 from dataclasses import replace

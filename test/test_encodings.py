@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pixels of camera messages: every encoding of cv_bridge, padding, byte order, and refusals."""
 
 from types import SimpleNamespace

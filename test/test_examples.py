@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Every script of examples/ runs as it stands, and the first prints what the README says."""
 
 from functools import cache

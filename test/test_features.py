@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ORB features: what is found, how it is spread, that it repeats, what is refused."""
 
 import cv2

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Readers come back with content or one FileError; writers leave a whole file or the old one."""
 
 from contextlib import suppress

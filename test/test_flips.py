@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Log odds after single flips, against making each flip and asking the detector."""
 
 from dataclasses import replace

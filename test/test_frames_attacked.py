@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attacks on single frames: what is drawn, what the map is, and that cells do not meet."""
 
 from dataclasses import replace

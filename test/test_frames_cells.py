@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Cells: keys that know what figures depend on, rows that the statistics take, and the store."""
 
 from dataclasses import replace

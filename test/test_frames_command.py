@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The command "evaluate" with a recipe of the protocol "frames"."""
 
 from contextlib import contextmanager

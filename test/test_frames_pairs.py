@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attacks by pairs: what is drawn, what a frame is held against, and that scores are the same."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The geometric check counts matches that agree on one motion, whatever the scene."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The graph neural network: what it computes, what is refused, and a tiny training."""
 
 import sys

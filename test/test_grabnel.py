@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """GRABNEL as a rival search: budgets, its acquisition, and a detector that it should break."""
 
 from graph_factory import graphs, make_graph

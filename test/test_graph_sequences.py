@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The graphs of a sequence: built once, then read; parts; bags that hold graphs."""
 
 from dataclasses import replace

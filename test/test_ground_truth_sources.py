@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Ground truth from every source that a bag or a file has, each on a small input of its own."""
 
 import bag_factory as make

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the command line reads, broken or hostile: one line, exit 2, nothing half written."""
 
 import json

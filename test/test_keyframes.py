@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Retrieval of keyframes: exactly what scoring all of them and sorting gives."""
 
 from dataclasses import replace

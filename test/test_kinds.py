@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Results folders of every kind: report, inspect and compare; what is damaged is said."""
 
 from functools import partial

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Labels with other thresholds: the same decisions, judged anew."""
 
 from dataclasses import asdict

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 from dataclasses import dataclass, replace
 
 from hypothesis import given, settings

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The command "labels": a folder that shows labels before anything is evaluated."""
 
 import json

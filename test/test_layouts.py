@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings in the layouts of published data sets: a line of bags/README.md each."""
 
 import bag_factory as make

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The detector: scores by hand, retrieval, gap, and queries that leave no trace."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Maps of a made-up replay, from its results folder to tables, report and g2o."""
 
 import json

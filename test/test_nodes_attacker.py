@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node attacker: nothing dropped, nothing given away, budgets kept, silence survived."""
 
 from graph_factory import make_graph

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node bag_replay: byte for byte, nothing lost in lockstep, honest about what is missing."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """No message ends a node: refused by cause, defects survived, deadlines kept, trouble said."""
 
 from array import array

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node lcd: one decision for each graph, answers that leave no trace, damage survived."""
 
 from dataclasses import replace

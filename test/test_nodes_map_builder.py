@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node map_builder: decisions and odometry in, the map out; in process, with real ROS."""
 
 from map_factory import wavy

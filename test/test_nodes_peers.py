@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The replay waits for nodes that get ready, and notices those that are none of its own."""
 
 import time

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Every node as a process of its own, wired by remapping, over the wire, ended by SIGINT."""
 
 import os

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Start of the nodes: parameters, help and refusals, each with its exit code."""
 
 from dataclasses import fields

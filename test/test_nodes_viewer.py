@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node viewer: one picture a decision, of what the other nodes have said."""
 
 import cv2

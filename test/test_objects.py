@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The object network: every kind of export by tiny models, what is refused, the filter."""
 
 import cv2

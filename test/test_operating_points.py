@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Operating points: how many of the loops met in training a decision keeps."""
 
 from dataclasses import replace

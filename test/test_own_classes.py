@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Classes of a user's own, from a package outside the tree, through the commands as they are."""
 
 import json

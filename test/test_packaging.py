@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What pip and colcon install, and what the launch file starts."""
 
 from configparser import ConfigParser
@@ -339,3 +342,11 @@ def test_launch_finds_what_ships(launched, tmp_path, monkeypatch):
     (tmp_path / 'bags' / 'flat_tour').mkdir(parents=True)
     assert launched(bag='bags/flat_tour')['bag_replay']['parameters'][1]['bag'] == 'bags/flat_tour'
     assert launched(bag='/nope')['bag_replay']['parameters'][1]['bag'] == '/nope'
+
+
+def test_every_python_file_says_its_licence():
+    for path in [*ROOT.glob('*.py'), *(file for folder in (
+            'adversarial_lcd_ros', 'benchmarks', 'examples', 'launch', 'requirements', 'soak',
+            'test') for file in (ROOT / folder).rglob('*.py'))]:
+        head = path.read_text(encoding='utf-8')[:200]
+        assert '# SPDX-License-Identifier: Apache-2.0\n' in head, path

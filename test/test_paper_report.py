@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The report on the paper's experiments, over synthetic rows (no detector made them)."""
 
 import csv

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Files of poses: every form, whatever wrote the text, and what is refused."""
 
 import bag_factory as make

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The poster: textures, where it lies, what it leaves alone, and the same over ROS."""
 
 import cv2

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Compiled code is loaded by what a node does before its first message, for every setting."""
 
 import pytest

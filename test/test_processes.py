@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Processes end together: with their parent, on signals at any time; and say why, once."""
 
 import os

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The object model: fetched once, verified always, never half there. No test downloads."""
 
 import hashlib

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings of the nodes made by hand: what they hold is reported, nothing is replayed."""
 
 from dataclasses import replace

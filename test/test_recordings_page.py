@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The table of bags/README.md: each of its lines is typed, on a small recording of its layout."""
 
 from pathlib import Path

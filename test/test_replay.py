@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a replay gives, in which order and with which stamps; recording and reading payloads."""
 
 from concurrent.futures import ThreadPoolExecutor

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Rings: walls and posters in views, worst cases, the page, and the recipe as a whole."""
 
 from dataclasses import replace

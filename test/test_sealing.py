@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Sealed graphs: none of somebody else's is taken, none twice, late or out of order."""
 
 import os

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Sequences from folders: what is read, and what is refused with a reason."""
 
 import bag_factory as make

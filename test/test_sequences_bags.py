@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Sequences from bags of ROS 1 and ROS 2, and the bag that an import writes."""
 
 from pathlib import Path

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Maps that can be worked out by hand, and what must hold of all of them."""
 
 import json

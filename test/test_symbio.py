@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The target symbio by hand: what a match is worth by the objects it hangs on, and what is not."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is printed reaches terminals of any encoding and width, and names stay as they are."""
 
 import io

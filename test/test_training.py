@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Training end to end on a tiny tour: what is written, that it repeats, what is refused."""
 
 from dataclasses import replace

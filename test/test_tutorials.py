@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The tutorials: their lines are typed, one after the other, on a small walk."""
 
 from pathlib import Path

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The textbook WL kernel as a target: by hand, against GraKeL, and its brittleness."""
 
 from dataclasses import replace

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The WL subtree kernel: by hand, against multisets, and after flips."""
 
 from collections import Counter

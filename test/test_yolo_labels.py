@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Folders of labels as YOLO writes them, and detectors that find nothing."""
 
 import logging

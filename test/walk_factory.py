@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A short walk and back in pictures, with settings under which its graphs are attacked at once."""
 
 import bag_factory as make

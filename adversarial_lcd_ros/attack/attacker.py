@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The man in the middle: clean graph in, perturbed graph out (paper, attack-module).
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The end of the time that a search has, known to its steps without being handed down to each."""
 
 from __future__ import annotations

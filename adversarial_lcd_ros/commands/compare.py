@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd compare: what changed between results folders of one kind."""
 
 from __future__ import annotations

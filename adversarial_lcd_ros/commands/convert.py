@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd convert: a recording of the nodes as any reader of MCAP understands it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd evaluate and demo: a bag replayed clean and attacked, or an experiment."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd import: a recorded sequence into a bag."""
 
 from __future__ import annotations

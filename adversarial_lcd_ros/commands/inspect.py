@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd inspect: what a bag, a payload or a results folder holds."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd labels: what a sequence's labels are, before anything is evaluated."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """adversarial-lcd map and render: what the closures of a replay do to the map."""
 
 from __future__ import annotations

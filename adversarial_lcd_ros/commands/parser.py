@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The command line of adversarial-lcd: all subcommands."""
 
 from __future__ import annotations

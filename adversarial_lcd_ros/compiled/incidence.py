@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Edges around every node, and how compiled code here sums."""
 
 from __future__ import annotations

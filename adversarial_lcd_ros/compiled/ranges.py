@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a graph's schema says of its numbers, held against them in one pass, compiled."""
 
 from __future__ import annotations

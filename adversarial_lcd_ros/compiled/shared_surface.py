@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How much of the surface in one depth image another one sees, too; compiled."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Two or more runs of one kind, side by side: what changed in figures, settings and versions."""
 
 from __future__ import annotations

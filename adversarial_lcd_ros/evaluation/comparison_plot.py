@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The picture of a comparison: the main figure of every row, one mark a run."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What attacks are in rows and reports: a search, with what it uses, and facts on its class."""
 
 from __future__ import annotations

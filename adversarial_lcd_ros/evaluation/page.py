@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the pages of all reports share: templates, embedded pictures, the look of plots."""
 
 from __future__ import annotations

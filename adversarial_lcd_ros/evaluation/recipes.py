@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Recipes: what an evaluation does, in small YAML files; each kind reads on in its own room.
 

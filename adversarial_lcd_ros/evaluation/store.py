@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """cells.jsonl: the finished cells of an evaluation by frames, one a line, only appended to."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The sequences of an experiment: labels and a digest here, graphs where they are attacked."""
 
 from __future__ import annotations

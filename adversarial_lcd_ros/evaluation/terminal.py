@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Results on a terminal of 80 columns: a line an attack; the report has the rest."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The figures of summary.json in words and cells, for the report and the terminal."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Processes that work on tasks side by side: on this machine, or on a Dask cluster."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Digests by which what is kept is told from what is to be made."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Keys of graphs that are sealed: files that only their owner can read."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ONNX networks, opened in one place: bounded in memory, and silent."""
 
 from __future__ import annotations

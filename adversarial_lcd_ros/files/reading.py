@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Text, JSON, JSON lines, YAML and CSV, read with bounds on size and depth.
 

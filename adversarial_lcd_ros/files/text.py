@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Text of numbers and names, as published data sets have it, whatever machine wrote it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Graphs into a bag, for replays without images: ``adversarial-lcd build``."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings of the nodes as any reader of MCAP understands them: ``adversarial-lcd convert``."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The graphs of a sequence: what every evaluation without ROS starts from."""
 
 from __future__ import annotations

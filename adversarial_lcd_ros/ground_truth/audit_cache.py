@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What an audit counted, kept on disk under a digest of everything that it was made of."""
 
 from __future__ import annotations

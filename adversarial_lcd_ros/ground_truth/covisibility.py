@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Exact co-visibility that was recorded, or rendered, beside a sequence."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Depth images beside a sequence: depth.npz, or those of the TUM RGB-D benchmark."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is known of the surface that two views share, whatever told it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The focal length of a camera that nobody calibrated, from true poses and matches."""
 
 from __future__ import annotations

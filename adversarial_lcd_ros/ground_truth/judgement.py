@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is said of every two frames before time counts: by their poses, or by evidence."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Labels of a sequence by the best evidence that there is (docs/labels.md)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Which frames and pairs of frames are loops, from ground truth only (docs/labels.md).
 

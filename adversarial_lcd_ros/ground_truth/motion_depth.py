@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Depth of features from the camera's own motion, by true poses."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How much two camera views share, from their poses alone."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Balanced pairs of frames for the pair protocol: the paper's "accuracy"."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The features of every frame that labels look at, and how deep they lie."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Keyframes by the block: what finds the most alike of a hundred thousand in milliseconds, compiled.
 

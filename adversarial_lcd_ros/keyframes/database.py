@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Keyframes of the map, and retrieval of candidates among them by visual words."""
 
 from __future__ import annotations

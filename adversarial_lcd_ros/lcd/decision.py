@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Scores of a target -> calibrated probability, by logistic regression kept as JSON.
 

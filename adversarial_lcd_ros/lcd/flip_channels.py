@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Scores of the target wl after every single flip of a graph, at once; see flips.py."""
 
 from __future__ import annotations

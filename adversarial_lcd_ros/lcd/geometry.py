@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The geometric check of a match: whether the features of both frames agree on one motion."""
 
 from __future__ import annotations

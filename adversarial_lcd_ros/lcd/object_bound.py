@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What no b flips can do to the score of the target symbio: a proven bound."""
 
 from __future__ import annotations

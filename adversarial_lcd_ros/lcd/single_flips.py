@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """All single flips of a graph, and what scores them at once."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Payloads in and out of std_msgs/UInt8MultiArray, as the bytes that go over the wire.
 

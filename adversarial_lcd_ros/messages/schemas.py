@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The messages of ``msg_schemas`` as types, and their CDR: this and earlier versions of each.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The node bag_replay: a bag's frames in, in real time or in lockstep with the decisions."""
 
 from __future__ import annotations

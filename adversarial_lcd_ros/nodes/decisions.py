@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Decisions as standard messages, for tools that know nothing of payloads."""
 
 from __future__ import annotations

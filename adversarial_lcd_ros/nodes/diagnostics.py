@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Counts, rates and latencies of a node, published on /diagnostics once a second."""
 
 from __future__ import annotations

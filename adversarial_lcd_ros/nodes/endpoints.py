@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Quality of service: what this package publishes with, and how it adapts to others."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The detector as the attacker sees it: a topic for queries and one for answers."""
 
 from __future__ import annotations

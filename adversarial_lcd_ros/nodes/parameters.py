@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 ROS parameters made from the settings of config.py: same names, defaults, ranges and texts.
 

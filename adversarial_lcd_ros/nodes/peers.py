@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The other nodes of a pipeline as the replay sees them: getting ready, or none of ours."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a stream of frames or graphs gives away: gaps, repeats, jumps in time, restarts."""
 
 from __future__ import annotations

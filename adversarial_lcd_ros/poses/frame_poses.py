@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Poses of a file, whatever its form, brought to the frames of a sequence."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Files of poses as benchmarks publish them: TUM, EuRoC, KITTI, and 4 x 4 matrices."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Frames and ground truth in, from whatever a sequence was published as; a bag out."""
 
 from adversarial_lcd_ros.poses.trajectory import PLACE_INDEX, WORLD, Trajectory

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The ground truth of a bag: which of its topics it could be, and the camera's poses from it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bags on disk: read with checks, written so that a half-written one never looks finished."""
 
 from __future__ import annotations

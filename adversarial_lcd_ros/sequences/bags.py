@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Sequences that are bags: of ROS 1 and ROS 2, raw or compressed images on any topic."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The header that messages start with: read, rewritten and made, without decoding the rest."""
 
 from __future__ import annotations

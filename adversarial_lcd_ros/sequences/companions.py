@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Files beside the frames of a recording that go with them into a bag."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is wrong with a bag that cannot be read, and what helps."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Detections in: the objects that somebody's detector found, as a CSV file."""
 
 from __future__ import annotations

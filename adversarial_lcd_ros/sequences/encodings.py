@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pixels of sensor_msgs/Image: every encoding of a camera that cv_bridge knows, to BGR or grey."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Folders as sequences: TUM RGB-D, 7-Scenes, images in order, walks, detections alone."""
 
 from __future__ import annotations

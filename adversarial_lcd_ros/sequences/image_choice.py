@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Which files of a folder are the frames of one camera, and when they were taken."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Any sequence to a bag that every node, and every ROS 2 tool, can replay."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A sequence, or a part of it, as users name it: ``PATH`` or ``PATH@FROM:TO``."""
 
 from __future__ import annotations

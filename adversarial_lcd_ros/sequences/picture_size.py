@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Width and height of a JPEG, PNG or WebP file by its header, before anything is decoded."""
 
 from __future__ import annotations

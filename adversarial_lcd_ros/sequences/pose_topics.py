@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Topics of poses in a bag: what they are, and their poses."""
 
 from __future__ import annotations

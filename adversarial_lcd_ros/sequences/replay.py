@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Bags in and out of the pipeline, without ROS: messages stay the bytes that they are.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Reading rosbag2: whatever wrote its MCAP, whatever its metadata say of quality of service."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A sequence: frames in order of time, and ground truth where there is any."""
 
 from __future__ import annotations

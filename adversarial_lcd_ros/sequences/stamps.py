@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The stamps of a bag's frames: which clock they are of, and what is wrong with them."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The frames of /tf and /tf_static: chains of links, composed to the camera's trajectory."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Detections in: a folder of labels as YOLO writes them, one text per picture."""
 
 from __future__ import annotations

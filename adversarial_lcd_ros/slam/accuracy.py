@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How far a map is off, after the rigid motion that lays it best over the truth."""
 
 from __future__ import annotations

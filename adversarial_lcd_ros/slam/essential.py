@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The relative pose of two frames from their features, as a front end with one camera has it."""
 
 from __future__ import annotations

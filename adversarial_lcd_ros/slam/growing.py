@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 A map that grows by a frame at a time (iSAM2, Kaess et al., IJRR 2012), for whoever runs live.
 

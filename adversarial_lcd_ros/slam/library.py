@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """gtsam, which only maps need: imported when first used, and missed in one line."""
 
 from __future__ import annotations

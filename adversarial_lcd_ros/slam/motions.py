@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Rigid motions as 4 x 4 matrices, many at once; tangents are rotation vector, then metres."""
 
 from __future__ import annotations

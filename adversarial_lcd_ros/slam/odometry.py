@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Odometry: the true steps of the camera, with the drift that a real one has.
 

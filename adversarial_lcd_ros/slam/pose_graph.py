@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The pose graph: odometry and closures, as gtsam's factors and as a g2o file."""
 
 from __future__ import annotations

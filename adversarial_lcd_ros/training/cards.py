@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a model card says of the sequences and decisions of a training."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A folder of trained artefacts: complete with its card, or not there."""
 
 from __future__ import annotations

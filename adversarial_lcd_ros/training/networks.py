@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Networks of the targets that have one, and what trains them."""
 
 from __future__ import annotations

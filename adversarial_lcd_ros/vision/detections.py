@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Objects from a detector of the user's own, in place of the network (paper, Fig. 2b)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pictures of graphs over their camera frames; flipped edges are red."""
 
 from __future__ import annotations

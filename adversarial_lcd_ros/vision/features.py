@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ORB features, spread over the frame (paper, Fig. 2a)."""
 
 from __future__ import annotations

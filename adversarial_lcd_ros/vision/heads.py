@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the numbers of a detection head cannot be: shapes alone do not tell heads apart."""
 
 from __future__ import annotations

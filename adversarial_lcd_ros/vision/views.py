@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pictures of decisions: the frame, its graph, the match beside it, the verdict and why."""
 
 from __future__ import annotations

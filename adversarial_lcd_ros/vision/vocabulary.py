@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Visual words: a tree of binary centres with tf-idf weights (paper, Fig. 2a; DBoW)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Continuous Weisfeiler-Lehman features of a graph (paper, Sec. 3.4, Eq. 4-6)."""
 
 from __future__ import annotations

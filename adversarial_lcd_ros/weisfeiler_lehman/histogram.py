@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The Weisfeiler-Lehman subtree kernel on integer labels, and all its values after single flips.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 A poster in the scene: the same simple, highly textured patch in two places (Ikram et al.).
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A poster in the frames of a replay, at times that are given: on the way to graph_builder."""
 
 from __future__ import annotations

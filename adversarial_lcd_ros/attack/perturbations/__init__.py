@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Choices of flips by name (registry.py). A new one is one small file and one line there."""
 
 from __future__ import annotations

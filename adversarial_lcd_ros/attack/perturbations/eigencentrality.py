@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Flips between the most central nodes: the paper's own choice (Sec. 3.3, Eq. 2-3).
 

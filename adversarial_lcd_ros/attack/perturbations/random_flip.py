@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Flips of random pairs (paper, Sec. 2, random edge perturbation)."""
 
 from __future__ import annotations

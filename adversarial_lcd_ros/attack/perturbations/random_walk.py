@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Flips between the ends of random walks (paper, Sec. 4.3)."""
 
 from __future__ import annotations

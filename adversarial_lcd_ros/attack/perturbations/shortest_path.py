@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Flips that make shortest paths longer or shorter (paper, Sec. 2 and 4.3)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 GRABNEL: Bayesian optimisation over edge flips (Wan et al., NeurIPS 2021, Sec. 3), a rival.
 

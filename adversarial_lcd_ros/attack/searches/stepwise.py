@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 The paper's search: flip after flip, the best of a few queried ones (Sec. 3.3 to 3.5).
 

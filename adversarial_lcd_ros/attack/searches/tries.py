@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Which flips a stepwise search may still ask about: what the setting ``retry`` decides."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bayesian linear regression with automatic relevance determination, as in GRABNEL."""
 
 from __future__ import annotations

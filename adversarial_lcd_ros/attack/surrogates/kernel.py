@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The width of a kernel: gamma as the paper writes it, or as scikit-learn scales it."""
 
 from __future__ import annotations

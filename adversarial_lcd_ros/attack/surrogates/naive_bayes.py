@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Gaussian naive Bayes (paper, Table 3)."""
 
 from __future__ import annotations

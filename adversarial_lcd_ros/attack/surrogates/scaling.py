@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Standardising features as often as a surrogate is asked."""
 
 from __future__ import annotations

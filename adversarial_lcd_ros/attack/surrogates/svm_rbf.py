@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """SVM with an RBF kernel, the paper's surrogate (Sec. 3.5, Eq. 8)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recipes of an evaluation of the targets: sequences, and the settings that each needs."""
 
 from __future__ import annotations

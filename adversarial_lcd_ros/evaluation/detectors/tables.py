@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The figures of the targets as tables in Markdown, for pages and for people."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Cells of an evaluation by frames: one attack with its settings, on one sequence, with one seed.
 

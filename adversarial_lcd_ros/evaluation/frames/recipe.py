@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Recipes of evaluations by frames: attacks with their defaults, and axes that are multiplied out.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Experiments: the cells of a recipe on several sequences with many seeds, side by side, resumable.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Results of many attacks on a sample of frames of several sequences."""
 
 from __future__ import annotations

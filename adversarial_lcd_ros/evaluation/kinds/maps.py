@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Maps of a replay: how far they are off, by run, stage and back end."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Labels by the audit alone, held against exact co-visibility."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """report.html of labels: what a sequence's labels are, in one file."""
 
 from __future__ import annotations

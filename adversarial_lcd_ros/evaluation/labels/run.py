@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A results folder of labels: counts, the trajectory, pairs to look at."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The map as it is made anew after every few frames: a GIF or an MP4 of it bending."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A line of cells.jsonl: one draw of the odometry, the closures of one run, all back ends."""
 
 from __future__ import annotations

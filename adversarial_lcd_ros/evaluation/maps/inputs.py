@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a map is made of: the true path, and the closures that every run of a replay declared."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pictures of maps: paths side by side, and how far each frame is off."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Maps in reports: a section of the replay's report, and a page of their own."""
 
 from __future__ import annotations

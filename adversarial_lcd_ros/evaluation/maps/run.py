@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Maps of a replay: every run, young and whole, by every back end, over draws of the odometry.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """summary.json of maps: means over draws, with intervals, against the clean run."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Maps in words and cells, for the terminal and the reports."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the plots on the paper's experiments show, taken from rows and summaries."""
 
 from __future__ import annotations

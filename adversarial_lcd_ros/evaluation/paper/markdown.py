@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Attacks by sequence as Markdown tables, one for each target: for a README."""
 
 from __future__ import annotations

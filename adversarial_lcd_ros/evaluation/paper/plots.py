@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Plots of the report on the paper's experiments, as SVG."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Which methods differ over sequences: Friedman's test, Nemenyi's critical difference.
 

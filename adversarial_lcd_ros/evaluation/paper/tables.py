@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Which tables the cells of an evaluation fill: those of the paper, and the attacks side by side.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What attacks are called beside each other: settings are named where they are not the usual."""
 
 from __future__ import annotations

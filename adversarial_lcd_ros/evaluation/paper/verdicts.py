@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the paper's experiments gave here, in plain sentences computed from the cells."""
 
 from __future__ import annotations

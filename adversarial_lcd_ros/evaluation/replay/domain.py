@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A ROS domain for one run alone: runs side by side on a machine must not hear each other."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Whether a conclusion hangs on the thresholds of the labels: decisions, labelled anew."""
 
 from __future__ import annotations

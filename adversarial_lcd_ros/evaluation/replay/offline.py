@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The same stream of graphs through attacker and detector as over ROS, without ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Which frames of a replay are worth a picture, and what is said below it."""
 
 from __future__ import annotations

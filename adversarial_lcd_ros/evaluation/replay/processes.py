@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """One replay of a bag through the nodes, each a process of its own."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Evaluation of what the nodes said while somebody recorded them: nothing is replayed."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """per_query.csv: one row a frame and run, everything that the figures are made of."""
 
 from __future__ import annotations

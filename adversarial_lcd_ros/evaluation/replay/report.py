@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """report.html: one file that holds all it shows, and opens offline and on a phone."""
 
 from __future__ import annotations

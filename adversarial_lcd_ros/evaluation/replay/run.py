@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Evaluation of one sequence over ROS 2: the same bag replayed clean and attacked.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Nodes as child processes: they end with this one, and say how far they are."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The pictures of a report: query, match and attacked graph of telling frames."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Evaluations that were broken off: their finished runs are not run again."""
 
 from __future__ import annotations

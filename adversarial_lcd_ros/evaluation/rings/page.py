@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The page of the rings: rings.md with its tables, from what summary.json holds."""
 
 from __future__ import annotations

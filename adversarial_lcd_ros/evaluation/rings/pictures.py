@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A picture of each ring: what was changed, and what the detector took it for."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Curves of the rings: over the budget of flips, over nodes moved, over the size of a poster."""
 
 from __future__ import annotations

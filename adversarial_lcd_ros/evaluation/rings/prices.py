@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a defence costs: the time that a decision takes with it, beside one without."""
 
 from __future__ import annotations

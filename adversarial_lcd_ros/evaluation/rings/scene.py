@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The frames of two places, and what hangs in them: on a wall where depth is known."""
 
 from __future__ import annotations

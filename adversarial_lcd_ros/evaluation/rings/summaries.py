@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What attacks come to beside each defence: cells of the matrix, and worst cases."""
 
 from __future__ import annotations

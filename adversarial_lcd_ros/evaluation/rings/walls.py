@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Where a poster can hang: a plane in the depth of a view, and how other views see it."""
 
 from __future__ import annotations

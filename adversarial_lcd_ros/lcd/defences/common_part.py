@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A loop stands only if enough matches of what could match: rooms that look alike contradict."""
 
 from __future__ import annotations

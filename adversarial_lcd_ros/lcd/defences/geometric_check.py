@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A loop stands only if the features of both frames agree on one camera motion."""
 
 from __future__ import annotations

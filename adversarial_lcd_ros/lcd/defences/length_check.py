@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """An edge recurs only if it is about as long in both frames."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """
 Edges follow from nodes: made again from them, edges that somebody changed are of no use, or seen.
 

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Object-anchored subgraphs: nearest to the paper's "semantic objects as main anchors"."""
 
 from __future__ import annotations

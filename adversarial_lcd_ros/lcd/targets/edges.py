@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Soft edge matching alone: the share of edges that recur."""
 
 from __future__ import annotations

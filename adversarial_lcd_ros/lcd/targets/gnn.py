@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A small graph neural network: matched features count by how alike it embeds them."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The object tier alone: classes, sizes and arrangement of objects, no visual features."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Matched features, weighed by how alike the objects are that they hang on: hubs decide."""
 
 from __future__ import annotations

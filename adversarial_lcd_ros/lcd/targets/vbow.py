@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Visual words without a graph: a control that no edge flip can touch."""
 
 from __future__ import annotations

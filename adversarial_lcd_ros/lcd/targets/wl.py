@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """SymbioLCD2-style target: soft Weisfeiler-Lehman matching on the unified graph."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The textbook Weisfeiler-Lehman subtree kernel on exact labels: brittle, and here to show it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Layouts of published recordings, each in a module of its own, and the table of them."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings in the layout of EuRoC MAV and TUM-VI: cameras on a body whose poses are known."""
 
 from __future__ import annotations

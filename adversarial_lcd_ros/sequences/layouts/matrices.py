@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Colour beside depth with matrices for poses: Replica (one file), ScanNet (one a frame)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Packages of OpenLORIS-Scene: several cameras on a robot whose base was tracked."""
 
 from __future__ import annotations

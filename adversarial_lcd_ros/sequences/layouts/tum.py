@@ -1,3 +1,6 @@
+# Copyright 2026 adversarial_lcd_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Folders in the layout of the TUM RGB-D benchmark, as those of Bonn are."""
 
 from __future__ import annotations
