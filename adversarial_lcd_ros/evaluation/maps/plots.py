@@ -89,7 +89,7 @@ def draw_paths(shown: Sequence[Shown], back_ends: Sequence[str] = BACK_ENDS) -> 
 def panel_size(flat: NDArray[np.float64]) -> tuple[float, float]:
     """Return width and height of a panel for a path (n, 2), inches."""
     wide, high = np.ptp(flat, axis=0) + 1e-9
-    return _PANEL, float(np.clip(_PANEL * high / wide, 0.6 * _PANEL, 1.4 * _PANEL)) + 0.2
+    return _PANEL, float(np.clip(_PANEL * high / wide, 0.4 * _PANEL, 1.4 * _PANEL)) + 0.25
 
 
 def _closures(case: Row) -> str:
