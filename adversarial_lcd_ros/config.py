@@ -209,7 +209,7 @@ class LcdConfig(Config):
         1, 'Temporal consistency: a candidate is scored together with this many keyframes '
         'before and after it.', low=0, high=20)
     kept_loops: float = setting(
-        0.95, 'Operating point: share of the loops met in training that the decision keeps at '
+        0.99, 'Operating point: share of the loops met in training that the decision keeps at '
         'probability 0.5; the fewer, the more a loop has to show.', low=0.5, high=1.0)
     threshold: float = setting(
         0.5, 'A loop closure is declared from this probability on.', low=0.0, high=1.0)
