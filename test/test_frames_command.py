@@ -166,14 +166,14 @@ def test_the_rings_are_run_reported_and_gone_on_with(tmp_path, command, capsys):
     assert summary['kind'] == 'rings'
     assert {(row['search'], row['defence']) for row in summary['rows']} == {
         (search, defence) for search in ('recall', 'move_nodes', 'replay')
-        for defence in ('none', 'defences rederive')}
+        for defence in ('none', 'rederive')}
     # Edges that are made again cannot be attacked.
     assert all(row['decline_pp'] == 0 for row in summary['rows']
-               if (row['search'], row['defence']) == ('recall', 'defences rederive'))
+               if (row['search'], row['defence']) == ('recall', 'rederive'))
     # No poster, two sizes, another texture, two posters, a control; a check or none.
     assert len(summary['posters']) == 6 * 2
     assert {row['pairs'] for row in summary['posters']} == {2}
-    assert {entry['defence'] for entry in summary['prices']} == {'none', 'defences rederive'}
+    assert {entry['defence'] for entry in summary['prices']} == {'none', 'rederive'}
     assert main(['report', str(tmp_path / 'out')]) == 0
     assert (tmp_path / 'out' / 'rings.md').read_text() == page
     hung = (tmp_path / 'out' / 'posters.json').read_bytes()

@@ -10,7 +10,7 @@ from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME
-from adversarial_lcd_ros.evaluation.rings.summaries import FLIPS, NODES, Summary
+from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS, NODES, Summary
 
 _NOTES = """\
 Clean and attacked are balanced accuracies, decline is their difference in points, with the 95 %
@@ -20,9 +20,10 @@ Suppressed: loops that had been found and were lost. Invented: loops at new plac
 left alone; in brackets those that certainly name another place. The optimum is a yardstick that
 looks into the detector."""
 _WORST = """\
-Worst case as RobustBench counts it: a frame is held only if every attack of the column fails on
-it, so each figure is below that of any single attack. Price: median processor time that a
-decision on a clean graph takes more than without the defence."""
+Worst case as RobustBench counts it: a frame is held only if every attack of the column, and of
+those left of it, fails on it, so each figure is below that of any single attack. Price: median
+processor time that a decision on a clean graph takes more than without the defence, on the
+machine of the run, whatever else it did."""
 _POSTERS = """\
 Of so many pairs of places that certainly differ, in how many a loop with the poster's frames was
 declared. Controls: no poster, and another poster of the kind in the later place; of these, all
@@ -59,16 +60,15 @@ def _leaderboard(worst: Sequence[Summary], prices: Sequence[Summary],
                  rows: Sequence[Summary]) -> list[str]:
     price = {(entry['sequence'], entry['defence']): entry['more_us'] for entry in prices}
     clean = {(row['sequence'], row['defence']): row['balanced_clean'] for row in rows}
-    left = {(entry['sequence'], entry['defence'], entry['rings']): entry for entry in worst}
+    left = {(entry['sequence'], entry['defence'], entry['level']): entry for entry in worst}
     lines = []
     for sequence, defence in dict.fromkeys((row['sequence'], row['defence']) for row in rows):
-        held = [left.get((sequence, defence, rings)) for rings in (FLIPS, f'{FLIPS}+{NODES}')]
+        held = [left.get((sequence, defence, level)) for level in LEVELS]
         more = price.get((sequence, defence))
         lines.append([sequence, defence, wording.percent(clean[sequence, defence]),
                       *(_worst(entry) for entry in held),
                       wording.UNDEFINED if more is None else f'{more:+,.0f}'])
-    return table(['sequence', 'defence', 'clean', 'worst of edge flips',
-                  'worst of flips and forged nodes', 'price, us'], lines)
+    return table(['sequence', 'defence', 'clean', *LEVELS, 'price, us'], lines)
 
 
 def _worst(entry: Summary | None) -> str:
@@ -76,7 +76,8 @@ def _worst(entry: Summary | None) -> str:
         return wording.UNDEFINED
     bounds = wording.interval(entry['ci95'], 100.0)
     held = wording.percent(entry['balanced'])
-    return f'{held} ({bounds}; {entry["attacks"]} attacks)' if bounds else held
+    attacks = f'{entry["attacks"]} attack{"s" if entry["attacks"] > 1 else ""}'
+    return f'{held} ({bounds}; {attacks})' if bounds else held
 
 
 def _matrix(rows: Sequence[Summary]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
 from adversarial_lcd_ros.evaluation.store import Row
@@ -21,6 +21,9 @@ from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIV
 # What an attacker changes, by his search; all else flips edges.
 NODE_SEARCHES = ('move_nodes', 'replay')
 FLIPS, NODES = 'flips', 'nodes'
+# Worst cases: flips within the usual r, those or as many nodes as usual, and all that is there.
+LEVELS = WITHIN_R, WITHIN_NODES, ANY = (
+    f'flips, r {AttackConfig.ratio:g}', f'or {AttackConfig.nodes_moved} nodes', 'any attack')
 Summary = dict[str, Any]
 _GROUP = ('sequence', 'target', 'detector', 'threshold', 'name', 'search', 'aware', 'ratio',
           'variant')
@@ -33,7 +36,7 @@ def ring_of(row: Mapping[str, Any]) -> str:
 
 def defence_title(row: Mapping[str, Any]) -> str:
     """Return the defences of a row in words."""
-    words = [row['detector']] if row['detector'] else []
+    words = [row['detector'].removeprefix('defences ')] if row['detector'] else []
     if row['threshold'] != LcdConfig.threshold:
         words.append(f'threshold {row["threshold"]:g}')
     return ', '.join(words) or 'none'
@@ -97,23 +100,34 @@ def worst_cases(rows: Sequence[Row], seed: int) -> list[Summary]:
     """
     Return for each defence and sequence what is left against the strongest attack on each frame.
 
-    As RobustBench counts: a frame is held if every attack of the ring fails on it. One entry for
-    FLIPS, one for FLIPS and NODES together.
+    As RobustBench counts: a frame is held if every attack of the level fails on it. One entry for
+    each of LEVELS that has an attack of its own; a level holds those before it.
     """
     groups: dict[tuple[str, str, str], list[Row]] = defaultdict(list)
     for row in rows:
         groups[row['sequence'], row['target'], defence_title(row)].append(row)
-    return [_worst(key, group, rings, seed) for key, group in groups.items()
-            for rings in ((FLIPS,), (FLIPS, NODES))
-            if any(ring_of(row) in rings for row in group)]
+    found = []
+    for key, group in groups.items():
+        for number, level in enumerate(LEVELS):
+            if any(_level_of(row) == level for row in group):
+                found.append(_worst(key, [row for row in group if _level_of(row)
+                                          in LEVELS[:number + 1]], level, seed))
+    return found
 
 
-def _worst(key: tuple[str, str, str], rows: Sequence[Row], rings: tuple[str, ...],
-           seed: int) -> Summary:
+def _level_of(row: Row) -> str:
+    if ring_of(row) == FLIPS:
+        return WITHIN_R if row['ratio'] <= AttackConfig.ratio else ANY
+    most = max((frame['node_budget'] for frame in row['frame_results']), default=0)
+    few = row['search'] == 'move_nodes' and most <= AttackConfig.nodes_moved
+    return WITHIN_NODES if few else ANY
+
+
+def _worst(key: tuple[str, str, str], rows: Sequence[Row], level: str, seed: int) -> Summary:
     held: dict[tuple[int, int], list[bool]] = defaultdict(list)
     kinds: dict[tuple[int, int], int] = {}
     attacks = set()
-    for row in (row for row in rows if ring_of(row) in rings):
+    for row in rows:
         attacks.add((attack_name(row), row['ratio'], row['variant']))
         for frame in row['frame_results']:
             if 'UM' not in (frame['clean'], frame['attacked']):
@@ -124,7 +138,7 @@ def _worst(key: tuple[str, str, str], rows: Sequence[Row], rings: tuple[str, ...
     kind = np.array([kinds[at] for at in held], np.int8)
     right = np.array([all(each) for each in held.values()], np.int64)
     rates = [right[kind == value] for value in (POSITIVE, NEGATIVE)]
-    return {'sequence': key[0], 'target': key[1], 'defence': key[2], 'rings': '+'.join(rings),
+    return {'sequence': key[0], 'target': key[1], 'defence': key[2], 'level': level,
             'attacks': len(attacks), 'frames': len(held),
             'balanced': (float(np.mean([rate.mean() for rate in rates]))
                          if all(map(len, rates)) else None),
