@@ -6,7 +6,7 @@
 from adversarial_lcd_ros import AttackConfig, Attacker, LoopClosureDetector, open_graphs
 
 detector, attacker = LoopClosureDetector(), Attacker(AttackConfig(search='recall'))
-for graph in open_graphs('bags/flat_tour@0:0.12').graphs:
+for graph in open_graphs('bags/flat_tour@0:0.2528').graphs:
     result = attacker.process(graph, lambda asked: detector.judge(asked).probability)
     before = detector.judge(graph)
     after = detector.detect(result.perturbed)  # judges, then remembers what it was sent

@@ -32,11 +32,11 @@ def test_example_runs(script):
 def test_the_frame_of_the_readme():
     """The first picture's caption and ten lines of Python tell the same."""
     readme = ' '.join((ROOT / 'README.md').read_text(encoding='utf-8').split())
-    caption = readme[readme.index('*Frame 42'):]
+    caption = readme[readme.index('*Frame 90'):]
     edges = re.search(r'adds (\d+) edges \(red\) to (\d+)', caption).groups()
     chances = re.search(r'goes from ([\d.]+) to ([\d.]+\d)', caption).groups()
     text = run(ROOT / 'examples' / 'attack_one_frame.py')
-    assert text.startswith('frame 42: {} of {} edges flipped'.format(*edges))
+    assert text.startswith('frame 90: {} of {} edges flipped'.format(*edges))
     assert 'probability of a loop: {} -> {}'.format(*chances) in text
 
 
