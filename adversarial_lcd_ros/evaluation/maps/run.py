@@ -128,9 +128,10 @@ def plan_cases(inputs: MapInputs, config: MapConfig, *, sweeps: bool) -> Iterato
             for drift in DRIFTS:
                 for run in dict.fromkeys((CLEAN, worst)):
                     yield Case(run, stage, frames, drift, draw)
-            for added in ADDED:
-                for consistent in (False, True)[:1 + (added > 1)]:
-                    yield Case(CLEAN, stage, frames, 1.0, draw, added, consistent)
+            for drift in (1.0, *DRIFTS):
+                for added in ADDED if drift == 1.0 else (ADDED[0], ADDED[-1]):
+                    for consistent in (False, True)[:1 + (added > 1)]:
+                        yield Case(CLEAN, stage, frames, drift, draw, added, consistent)
         if sweeps:
             for drift in (1.0, *DRIFTS):
                 for missing in MISSING:
