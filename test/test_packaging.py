@@ -32,8 +32,8 @@ SHARED = ('launch', 'config', 'msg_schemas', 'bags')
 FAST_DDS = ROOT / 'config' / 'fastdds.xml'
 # Released into Jazzy.
 ROS_PACKAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros',
-                'nav_msgs', 'rcl_interfaces', 'rclpy', 'ros2launch', 'rosgraph_msgs', 'sensor_msgs',
-                'std_msgs', 'tf2_msgs'}
+                'nav_msgs', 'rcl_interfaces', 'rclpy', 'ros2launch', 'rosgraph_msgs',
+                'sensor_msgs', 'std_msgs', 'tf2_msgs'}
 # Keys of the public lists of rosdep, and the distributions that each installs on Ubuntu 24.04:
 # there is none for mcap and threadpoolctl alone.
 ROSDEP_KEYS = {
