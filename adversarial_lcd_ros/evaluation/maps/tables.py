@@ -63,7 +63,8 @@ def closures_title(row: Mapping[str, Any]) -> str:
     if row['missing'] is not None:
         return f'{100 * row["missing"]:.0f} % of the right closures missing'
     kind = 'consistent' if row['consistent'] else 'scattered'
-    return f'{row["added"]} {kind} false closures' if row['added'] else 'right closures alone'
+    closures = 'closure' if row['added'] == 1 else 'closures'
+    return f'{row["added"]} {kind} false {closures}' if row['added'] else 'right closures alone'
 
 
 def _is_declared(row: Mapping[str, Any]) -> bool:
