@@ -27,7 +27,7 @@ from adversarial_lcd_ros.files.reading import MIB, parse_json, read_bytes
 from adversarial_lcd_ros.files.writing import replacing, write_bytes, write_json
 
 FORMAT, VERSION = 'adversarial-lcd results', 1
-_MAX_PACKED, _MAX_BYTES, _MAX_LINE = 64 * MIB, 1024 * MIB, 64 * MIB
+_MAX_PACKED, _MAX_BYTES, _MAX_LINE = 64 * MIB, 256 * MIB, 16 * MIB
 _XZ_MEMORY, _CHUNK = 128 * MIB, MIB
 _DOCUMENTS = {'summary': SUMMARY, 'configuration': CONFIGURATION, 'environment': ENVIRONMENT}
 # Releases that rows name (``versions``): they become names of files.
@@ -124,8 +124,8 @@ def _read(path: Path) -> tuple[dict[str, Any], list[Row]]:
         raise EvaluationError(f'{path} is no archive of results that this release reads: expected '
                               f'format "{FORMAT}" {VERSION}, found {found}')
     wrong = [name for name in (*_DOCUMENTS, 'releases') if not isinstance(head.get(name), dict)]
-    wrong += [f'releases of {name[:20]!r}' for name, values in (head.get('releases') or {}).items()
-              if not _DIGEST.fullmatch(name) or not isinstance(values, dict)] if not wrong else []
+    wrong = wrong or [f'releases of {name[:20]!r}' for name, values in head['releases'].items()
+                      if not _DIGEST.fullmatch(name) or not isinstance(values, dict)]
     if wrong:
         raise EvaluationError(f'{path}, line 1: {", ".join(wrong)} missing or not what it should '
                               'be: get the file again')
