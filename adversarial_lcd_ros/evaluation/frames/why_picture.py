@@ -67,8 +67,8 @@ def caption(why: Why) -> str:
             f'against {against}; {graph.node_count} nodes, {why.edits} edits allowed. Columns 1 '
             f'to 3: the first {ASKED} flips that an attack asks about. Column 4: the {ASKED} '
             'flips that take most, and nodes the larger the more the answer changes by all flips '
-            'there. Colour: log odds taken, from none (grey) to the most that any flip takes from '
-            'this target (dark red).')
+            'there. Colour: log odds taken, from none (grey) to what each edit has to take on '
+            'average to turn the decision over, or more (dark red).')
 
 
 def sentences(why: Why) -> list[str]:
@@ -79,7 +79,8 @@ def sentences(why: Why) -> list[str]:
                          for name, pairs in seen.asked.items())
         lines.append(
             f'{seen.target} finds this loop by {_number(seen.margin)} log odds above its '
-            f'threshold. The strongest of all {len(seen.taken):,} single flips takes '
+            f'threshold: each of {why.edits} edits has to take {_number(_needed(why, seen))} on '
+            f'average. The strongest of all {len(seen.taken):,} single flips takes '
             f'{_number(float(seen.taken.max()))}, and {100 * seen.felt:.0f} % change the answer '
             f'at all. The best of the first {ASKED} asked about: {best}.')
     return lines
@@ -102,16 +103,18 @@ def draw_why(why: Why, name: str = WHY) -> bytes:
     height = width * graph.height / graph.width + 0.55
     rows = per_target * len(why.targets)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(columns * width, rows * height + 0.3 * len(why.targets)),
+        figure = Figure(figsize=(columns * width, rows * height + 0.2 * len(why.targets)),
                         layout='constrained', dpi=_DPI)
         parts = np.atleast_1d(figure.subfigures(len(why.targets), 1))
         for part, seen in zip(parts, why.targets, strict=True):
-            part.suptitle(f'target {seen.target}: a loop by {_number(seen.margin)} log odds above '
-                          'the threshold', fontsize=10.5, fontweight='bold', x=0.01, ha='left')
+            needed = _needed(why, seen)
+            part.suptitle(
+                f'target {seen.target}: each edit has to take {_number(needed)} log odds',
+                fontsize=10.5, fontweight='bold', x=0.01, ha='left')
             image = _faded(frame_image(why.stream, seen.graph))
             for axes, panel in zip(part.subplots(per_target, columns).ravel(), _panels(seen),
                                    strict=True):
-                _draw(axes, image, seen, *panel)
+                _draw(axes, image, seen, needed, *panel)
         stream = io.BytesIO()
         figure.savefig(stream, format='jpg', pil_kwargs={'quality': 85})
     return stream.getvalue()
@@ -124,18 +127,17 @@ def _panels(seen: Sensitivity) -> Iterator[_Panel]:
            f'strongest takes {_number(float(seen.taken.max()))}', seen.strongest, True)
 
 
-def _draw(axes: Any, image: NDArray[np.uint8], seen: Sensitivity, title: str,
+def _draw(axes: Any, image: NDArray[np.uint8], seen: Sensitivity, needed: float, title: str,
           pairs: NDArray[np.int64], with_nodes: bool) -> None:
     graph = seen.graph
-    top = max(float(seen.taken.max()), 1e-12)
     axes.imshow(image, extent=(0, graph.width, graph.height, 0))
     axes.add_collection(LineCollection(graph.position[graph.edge], colors='#5a6b7d',
                                        linewidths=0.25, alpha=0.35))
-    share = np.clip(seen.taken_by(pairs) / top, 0.0, 1.0)
+    share = np.clip(seen.taken_by(pairs) / max(needed, 1e-12), 0.0, 1.0)
     order = np.argsort(share, kind='stable')  # the strongest on top
     axes.add_collection(LineCollection(
         graph.position[pairs[order]], colors=_PALETTE(share[order]),
-        linewidths=0.9 + 1.3 * share[order]))
+        linewidths=0.8 + 1.0 * share[order]))
     _nodes(axes, graph, seen.at_node if with_nodes else None)
     axes.set_title(title, fontsize=9.0, color=INK)
     axes.set(xlim=(0, graph.width), ylim=(graph.height, 0), xticks=[], yticks=[])
@@ -146,10 +148,15 @@ def _nodes(axes: Any, graph: MultiTierGraph, weight: NDArray[np.float64] | None)
     is_object = np.arange(graph.node_count) < graph.object_count
     size = np.where(is_object, 26.0, 3.0)
     if weight is not None and weight.max() > 0:
-        size = 3.0 + 90.0 * weight / weight.max()
+        size = 3.0 + 50.0 * weight / weight.max()
     for kind, colour, marker in ((~is_object, '#2e8064', 'o'), (is_object, '#2f5d8a', 's')):
         axes.scatter(*graph.position[kind].T, s=size[kind], c=colour, marker=marker,
                      linewidths=0.4, edgecolors='white', zorder=3)
+
+
+def _needed(why: Why, seen: Sensitivity) -> float:
+    """Return the log odds that each edit has to take on average to turn the decision over."""
+    return seen.margin / max(why.edits, 1)
 
 
 def _best(seen: Sensitivity, pairs: NDArray[np.int64]) -> float:
