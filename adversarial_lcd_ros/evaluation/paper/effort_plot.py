@@ -50,16 +50,20 @@ def draw_effort(effort: Effort, width: float) -> bytes:
         axes.set_xticklabels([str(count) for count in ticks])
         axes.minorticks_off()
         axes.grid(axis='y', color=GRID, linewidth=0.6)
-        methods = sorted({line.method for line in effort.lines},
-                         key=lambda name: -method_facts(name).rank)
-        rules = [rule for rule in _DASHES if any(line.rule == rule for line in effort.lines)]
-        handles = [Line2D([], [], color=colour(name), marker=method_facts(name).marker,
-                          markersize=4.5, linewidth=_LINE,
-                          label=method_facts(name).title or name.replace('_', ' '))
-                   for name in methods]
-        handles += [Line2D([], [], color=INK, linestyle=_DASHES[rule], linewidth=_LINE,
-                           label=_RULES[rule]) for rule in rules]
-        place = ({'loc': 'outside lower center', 'ncols': 2} if width <= NARROW
-                 else {'loc': 'outside right upper'})
-        figure.legend(handles=handles, fontsize=8.0, **place)
+        _legend(figure, effort, width)
         return svg(figure)
+
+
+def _legend(figure: Figure, effort: Effort, width: float) -> None:
+    methods = sorted({line.method for line in effort.lines},
+                     key=lambda name: -method_facts(name).rank)
+    rules = [rule for rule in _DASHES if any(line.rule == rule for line in effort.lines)]
+    handles = [Line2D([], [], color=colour(name), marker=method_facts(name).marker,
+                      markersize=4.5, linewidth=_LINE,
+                      label=method_facts(name).title or name.replace('_', ' '))
+               for name in methods]
+    handles += [Line2D([], [], color=INK, linestyle=_DASHES[rule], linewidth=_LINE,
+                       label=_RULES[rule]) for rule in rules]
+    place = ({'loc': 'outside lower center', 'ncols': 2} if width <= NARROW
+             else {'loc': 'outside right upper'})
+    figure.legend(handles=handles, fontsize=8.0, **place)
