@@ -6,7 +6,7 @@
 from paper_factory import SEQUENCES, make_row
 import pytest
 
-from adversarial_lcd_ros.evaluation.paper.effort import efforts, lost_by_one, rule_of
+from adversarial_lcd_ros.evaluation.paper.effort import efforts, lost_by_one, orders, rule_of
 from adversarial_lcd_ros.evaluation.paper.effort_plot import draw_effort
 from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 
@@ -48,6 +48,11 @@ def test_a_line_for_each_perturbation_and_rule():
                  and row['queries_per_edit'] == count
                  and rule_of(row['variant'])[0] == line.rule]))
     assert found.optimum == pytest.approx(share_lost(rows[-2:]))
+    told = orders(found)
+    assert [text.split(' an edit')[0] for text in told] == ['1 query', '5 queries', '40 queries']
+    lost = {line.method: 100 * line.lost[-1] for line in found.lines if line.rule == 'gained'}
+    assert told[-1].endswith(f'(retry gained): shortest path {lost["shortest_path"]:.1f} %, '
+                             f'eigencentrality {lost["eigencentrality"]:.1f} %')
     for width in (9.4, 4.4):
         assert draw_effort(found, width).startswith(b'<?xml')
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri
 from adversarial_lcd_ros.evaluation.paper import curves, plots, tables
-from adversarial_lcd_ros.evaluation.paper.effort import efforts, lost_by_one
+from adversarial_lcd_ros.evaluation.paper.effort import efforts, lost_by_one, orders
 from adversarial_lcd_ros.evaluation.paper.effort_plot import draw_effort
 from adversarial_lcd_ros.evaluation.paper.summaries import Summary
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
@@ -67,7 +67,7 @@ def report_plots(rows: Sequence[Row], cells: Sequence[Summary],
         'efforts': [{'title': f'target {effort.setting["target"]}, '
                               f'{_shared_title(effort.setting)}',
                      'sequences': len(effort.sequences),
-                     'plot': plot(partial(draw_effort, effort)),
+                     'plot': plot(partial(draw_effort, effort)), 'orders': orders(effort),
                      'by_one': lost_by_one(rows, effort, ratio)} for effort in found]}
 
 

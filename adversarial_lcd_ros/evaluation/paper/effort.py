@@ -141,6 +141,20 @@ def _mean(values: Sequence[float]) -> float:
     return math.fsum(values) / len(values)
 
 
+def orders(effort: Effort) -> list[str]:
+    """Return which perturbation leads, a sentence for each number of queries; the usual rule."""
+    rules = {line.rule for line in effort.lines}
+    rule = AttackConfig.retry if AttackConfig.retry in rules else min(rules)
+    lost: dict[int, list[tuple[float, str]]] = {}
+    for line in (line for line in effort.lines if line.rule == rule):
+        for count, share in zip(line.queries, line.lost, strict=True):
+            lost.setdefault(count, []).append((share, line.method.replace('_', ' ')))
+    return [f'{count} {"query" if count == 1 else "queries"} an edit (retry {rule}): '
+            + ', '.join(f'{name} {100 * share:.1f} %' for share, name in
+                        sorted(found, key=lambda entry: (-entry[0], entry[1])))
+            for count, found in sorted(lost.items())]
+
+
 def lost_by_one(rows: Sequence[Row], effort: Effort, ratio: float) -> list[dict[str, str]]:
     """
     Return loops that one of two attacks lost and the other did not: heading to cell.
