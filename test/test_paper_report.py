@@ -19,7 +19,9 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
+from adversarial_lcd_ros.evaluation.paper.drawn import first_of_targets
 from adversarial_lcd_ros.evaluation.paper.exports import latex_escape, latex_table
+from adversarial_lcd_ros.evaluation.paper.headline import headline
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables
 from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
@@ -52,7 +54,7 @@ def surrogate_rows(powers=POWERS, sequences=SEQUENCES, **settings):
 
 def words_of(rows):
     cells = summarise_cells(rows)
-    return verdicts.headline(summarise_methods(cells), tables.main_ratio(cells))
+    return headline(summarise_methods(cells), tables.main_ratio(cells))
 
 
 @pytest.fixture(scope='module')
@@ -147,8 +149,9 @@ def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
         row['nodes'] = 300
     cells = summarise_cells(rows)
     text = markdown_tables(cells, summarise_methods(cells), 3e-4)
-    about, _, *lines = text.splitlines()
-    assert 'r = 0.0003, 300 features' in about
+    about, _, usual, _, *lines = text.splitlines()
+    assert 'r = 0.0003.' in about
+    assert usual.startswith('Unless said otherwise: 300 features')
     assert lines[0] == ('| `wl` | frames | edits | queries | synthetic_kitchen | synthetic_tour | '
                         'mean | of the optimum |')
     assert [line.split(' | ')[0] for line in lines[2:6]] == [
@@ -160,7 +163,7 @@ def test_markdown_has_a_line_an_attack_and_a_column_a_sequence():
     assert fields[1] == '200 (100 different)'
     assert fields[5].startswith(f'{recall["decline_pp"]:.1f} (')
     assert lines[7].endswith('allows an edit: synthetic_desk.')
-    assert lines[9].startswith('| `anchored` |')
+    assert lines[11].startswith('| `anchored` |')
 
 
 def test_headline_is_of_the_black_box_attack():
@@ -179,6 +182,57 @@ def test_headline_is_of_the_usual_size_of_graph():
                 ('recall', 'none', 0.3, 300), ('eigencentrality', 'svm_rbf', 0.1, 300),
                 ('recall', 'none', 0.9, 1000))]
     assert '(recall, query-guided, 300 features)' in words_of(rows)
+
+
+def test_headline_says_whose_what_the_papers_took_and_where_it_works():
+    rows = [make_row(sequence, target, name, surrogate, power=power, judged=judged, frames=200)
+            for sequence in SEQUENCES
+            for target, judged, name, surrogate, power in (
+                ('wl', 'frames', 'recall', 'none', 0.4),
+                ('wl', 'frames', 'eigencentrality', 'svm_rbf', 0.05),
+                ('symbio', 'pairs', 'eigencentrality', 'svm_rbf', 0.3),
+                ('symbio', 'pairs', 'shortest_path', 'svm_rbf', 0.6))]
+    text = words_of(rows)
+    assert "(recall, query-guided, 300 features), this project's own, took" in text
+    assert 'at threshold 0.5, judged against the map.' in text
+    methods = {(method['target'], method['method']): wording.points(method['decline_pp'])
+               for method in summarise_methods(summarise_cells(rows))}
+    assert ("The paper's own (eigencentrality + SVM-RBF, query-guided) took "
+            f'{methods["wl", "eigencentrality"]} points') in text
+    assert ("The paper's own took most from target symbio (eigencentrality + SVM-RBF, "
+            'query-guided, 300 features, threshold 0.5, judged by pairs): '
+            f'{methods["symbio", "eigencentrality"]} points') in text
+    assert text.endswith('There shortest path + SVM-RBF, query-guided took most, '
+                         f'{methods["symbio", "shortest_path"]} points.')
+    alone = words_of([row for row in rows if (row['target'], row['perturbation'])
+                      == ('wl', 'eigencentrality')])
+    assert "features), the paper's own, took" in alone
+    assert "The paper's own (" not in alone
+
+
+def test_the_first_table_of_each_target_is_open(tmp_path):
+    rows = [make_row(sequence, target, name, 'svm_rbf', judged=judged, queries_per_edit=queries)
+            for sequence in SEQUENCES[:2]
+            for target, judged in (('wl', 'frames'), ('symbio', 'pairs'))
+            for queries in (1, 40) for name in ('eigencentrality', 'random_walk')]
+    found = tables.perturbation_tables(summarise_cells(rows))
+    # Of settings as complete the usual one comes first.
+    assert [(table.setting['target'], table.setting['queries_per_edit'])
+            for table in first_of_targets(found)] == [('wl', 40), ('symbio', 40)]
+    page = write_paper_report(tmp_path, rows).read_text()
+    for table in found:
+        start = 'h3 class="setting"' if table.setting['queries_per_edit'] == 40 else 'summary'
+        assert f'<{start}>{table.title.capitalize()}</{start[:2] if start[0] == "h" else start}>' \
+            in page
+    assert 'Perturbations, symbio by pairs.' in page
+
+
+def test_pairs_have_a_map_of_their_own():
+    rows = [make_row(target=target, judged=judged, power=power, frames=100)
+            for target in ('wl', 'symbio') for judged, power in (('frames', 0.2), ('pairs', 0.6))]
+    frames, pairs = curves.target_maps(summarise_cells(rows), 3e-4)
+    assert (frames.setting['judged'], pairs.setting['judged']) == ('frames', 'pairs')
+    assert np.all(pairs.declines > frames.declines)
 
 
 def test_another_threshold_is_another_setting():
@@ -297,14 +351,14 @@ def test_map_of_targets_holds_transfer():
                      asked_target=asked, frames=100)
             for target, asked, power in (('wl', 'wl', 0.4), ('anchored', 'anchored', 0.6),
                                          ('anchored', 'wl', 0.2))]
-    found = curves.target_map(summarise_cells(rows), 3e-4)
+    found, = curves.target_maps(summarise_cells(rows), 3e-4)
     assert found.attacks == ('recall, query-guided', 'recall, query-guided, asked wl')
     assert found.targets == ('wl', 'anchored')
     assert found.transfer
     assert found.declines == pytest.approx(np.array(
         [[rows[0]['decline_pp'], rows[1]['decline_pp']],
          [rows[0]['decline_pp'], rows[2]['decline_pp']]]))
-    assert curves.target_map(summarise_cells(rows[:1]), 3e-4) is None
+    assert curves.target_maps(summarise_cells(rows[:1]), 3e-4) == []
 
 
 @pytest.mark.parametrize('count', [2, 3, 9])
@@ -351,5 +405,5 @@ def test_a_sequence_without_new_places_reports_what_was_suppressed(tmp_path):
     assert f'| {told} | - |' in (tmp_path / 'tables.md').read_text()
     page = (tmp_path / 'report.html').read_text()
     assert f'<td data-name="suppressed">{told}</td>' in page
-    assert f'suppressed {told} loops found on synthetic_tour' in verdicts.headline(
+    assert f'suppressed {told} loops found on synthetic_tour' in headline(
         [], 3e-4, [cell])

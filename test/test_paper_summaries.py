@@ -207,3 +207,14 @@ def test_settings_without_a_column_tell_cells_apart():
     assert [cell['variant'] for cell in summarise_cells(rows)] == ['', 'gamma scale']
     del rows[0]['variant']
     assert [cell['variant'] for cell in summarise_cells(rows)] == ['', 'gamma scale']
+
+
+def test_nodes_moved_are_summarised_where_rows_have_them():
+    rows = [make_row(sequence, seed=seed, nodes_moved_mean=moved)
+            for sequence, moved in (('synthetic_tour', 2.0), ('synthetic_desk', 6.0))
+            for seed in (0, 1)]
+    cells = summarise_cells(rows)
+    assert sorted(cell['nodes_moved_mean'] for cell in cells) == [2.0, 6.0]
+    method, = summarise_methods(cells)
+    assert method['nodes_moved_mean'] == 4.0
+    assert 'nodes_moved_mean' not in summarise_cells([make_row()])[0]

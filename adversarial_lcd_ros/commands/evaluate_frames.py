@@ -69,11 +69,9 @@ def refuse_options(options: Namespace) -> None:
 
 def run(options: Namespace) -> None:
     """Run the recipe, or what is left of it, and write the report."""
-    from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
     from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
     from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
     from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
-    from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.recipes import RINGS, read_recipe
     from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
     from adversarial_lcd_ros.evaluation.store import open_store
@@ -101,12 +99,24 @@ def run(options: Namespace) -> None:
         if recipe['protocol'] == RINGS:
             report = _rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
         else:
-            write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
+            _draw(folder, streams, cells, rows, lcd)
             report = write_paper_report(folder, rows)
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
         return
     _conclude(rows, time.monotonic() - started, report)
+
+
+def _draw(folder: Path, streams: list[Stream], cells: list[Cell], rows: list[Row],
+          lcd: LcdConfig) -> None:
+    """Leave pictures of attacked frames in the folder, and of why attacks work where they do."""
+    from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
+    from adversarial_lcd_ros.evaluation.frames.why import explain
+    from adversarial_lcd_ros.evaluation.frames.why_picture import write_why
+    from adversarial_lcd_ros.evaluation.pictures import write_pictures
+
+    write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
+    write_why(folder, explain(streams, cells, rows, lcd))
 
 
 def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],

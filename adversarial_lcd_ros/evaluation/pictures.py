@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,6 +19,8 @@ from adversarial_lcd_ros.evaluation.results import PICTURES, read_json
 from adversarial_lcd_ros.files.reading import MIB, read_bytes
 from adversarial_lcd_ros.files.writing import write_bytes, write_json
 
+# The picture of why an attack works on one target and not on another, and its text.
+WHY, WHY_NARROW, WHY_TEXT = 'why.jpg', 'why_narrow.jpg', 'why.json'
 _INDEX = 'pictures.json'
 _JPEG_QUALITY = 82
 _MAX_JPEG_BYTES = 16 * MIB
@@ -86,3 +89,27 @@ def read_pictures(folder: Path) -> list[tuple[str, str, bytes]]:
     except (KeyError, TypeError) as error:
         raise EvaluationError(f'{place / _INDEX} is no list of pictures: {error!r}; make the '
                               'results anew') from error
+
+
+def read_why(folder: Path) -> dict[str, Any] | None:
+    """
+    Return caption, sentences, wide and narrow (JPEG) of the picture of why.
+
+    None if the run has drawn none.
+
+    Raises
+    ------
+    EvaluationError, FileError
+        The folder is damaged.
+
+    """
+    place = folder / PICTURES
+    if not (place / WHY_TEXT).is_file():
+        return None
+    text = read_json(place / WHY_TEXT)
+    if not isinstance(text.get('caption'), str) or not isinstance(text.get('sentences'), list):
+        raise EvaluationError(f'{place / WHY_TEXT} lacks caption or sentences: run the evaluation '
+                              'again')
+    return {'caption': text['caption'], 'sentences': [str(line) for line in text['sentences']],
+            'wide': read_bytes(place / WHY, _MAX_JPEG_BYTES),
+            'narrow': read_bytes(place / WHY_NARROW, _MAX_JPEG_BYTES)}

@@ -10,10 +10,10 @@ from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import whose
+from adversarial_lcd_ros.evaluation.paper.headline import headline
 from adversarial_lcd_ros.evaluation.paper.summaries import ATTACK, Summary, summarise_methods
 from adversarial_lcd_ros.evaluation.paper.tables import main_ratio
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
-from adversarial_lcd_ros.evaluation.paper.verdicts import headline
 
 Rows = list[dict[str, str]]
 ARROW = '→'

@@ -137,7 +137,7 @@ def _picture(stream: Stream, row: Row, frame: dict[str, Any], found: FrameResult
                f'{row["target"]}.')
     return Picture(
         f'{row["sequence"]}, frame {clean.sequence}: {effect} by {wording.attack_title(row)}',
-        caption, draw_attack(_image(stream, clean), clean, _image(stream, match), match,
+        caption, draw_attack(frame_image(stream, clean), clean, frame_image(stream, match), match,
                              found.result.perturbed))
 
 
@@ -147,7 +147,8 @@ def _spent(frame: dict[str, Any]) -> str:
     return f'{frame["edits"]} edges flipped of {frame["edit_budget"]} allowed'
 
 
-def _image(stream: Stream, graph: MultiTierGraph) -> NDArray[np.uint8]:
+def frame_image(stream: Stream, graph: MultiTierGraph) -> NDArray[np.uint8]:
+    """Return the picture that a graph was built from, BGR; grey where there is none."""
     path = SequencePart.parse(stream.graphs.source).path
     if stream.graphs.builder.detector == 'csv' or holds_graphs(path):
         return np.full((graph.height, graph.width, 3), _BLANK_GREY, np.uint8)

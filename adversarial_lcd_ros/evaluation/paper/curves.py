@@ -106,16 +106,21 @@ def _share_within(queries: NDArray[np.float64],
     return np.asarray(reached / max(len(queries), 1), np.float64)
 
 
-def target_map(cells: Sequence[Summary], ratio: float) -> TargetMap | None:
+def target_maps(cells: Sequence[Summary], ratio: float) -> list[TargetMap]:
     """
     Return the mean declines of attacks by target, with those that asked another target.
 
-    Only cells of the commonest setting, of sequences on which all targets were attacked, and
-    attacks that have more than one. None without such.
+    One map for each way to judge. Only cells of the commonest setting, of sequences on which all
+    targets were attacked, and attacks that have more than one.
 
     """
-    chosen = _comparable([cell for cell in cells
-                          if cell['ratio'] == ratio and cell['mode'] != 'pass'])
+    chosen = [cell for cell in cells if cell['ratio'] == ratio and cell['mode'] != 'pass']
+    maps = [_target_map(_comparable([cell for cell in chosen if cell['judged'] == judged]))
+            for judged in sorted({cell['judged'] for cell in chosen})]
+    return [found for found in maps if found is not None]
+
+
+def _target_map(chosen: Sequence[Summary]) -> TargetMap | None:
     methods = summarise_methods(chosen)
     there = {method['target'] for method in methods}
     targets = tuple(name for name in (*TARGETS, *sorted(there - set(TARGETS))) if name in there)

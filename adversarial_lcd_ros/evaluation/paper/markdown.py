@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
@@ -14,7 +14,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     Summary,
     is_attackable,
 )
-from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
+from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_by_target, usual_title
 from adversarial_lcd_ros.registry import TARGETS
 
 _NONE = '-'
@@ -33,23 +33,24 @@ def markdown_tables(cells: Sequence[Summary], methods: Sequence[Summary], ratio:
 
     """
     cells = [cell for cell in cells if cell['ratio'] == ratio]
-    usual = usual_settings(cells)
+    usual = usual_by_target(cells)
     there = {cell['target'] for cell in cells}
     targets = [name for name in TARGETS if name in there]
     return '\n'.join([
         f'Decline in balanced accuracy, points, with 95 % intervals over blocks of time; r = '
-        f'{ratio:g}, {usual_title(usual)}, unless said otherwise.\n',
+        f'{ratio:g}.\n',
         *(_target(target, [cell for cell in cells if cell['target'] == target],
                   [method for method in methods
-                   if method['target'] == target and method['ratio'] == ratio], usual)
+                   if method['target'] == target and method['ratio'] == ratio], usual[target])
           for target in targets),
         *_one_sided(one_sided_rows(cells, usual))])
 
 
-def one_sided_rows(cells: Sequence[Summary], usual: Summary) -> list[dict[str, str]]:
+def one_sided_rows(cells: Sequence[Summary], usual: Mapping[str, Summary]
+                   ) -> list[dict[str, str]]:
     """Return what attacks did where loops, or new places, are missing: heading to cell."""
     return [{'sequence': cell['sequence'],
-             'target and attack': f'{cell["target"]}: {full_title(cell, usual)}',
+             'target and attack': f'{cell["target"]}: {full_title(cell, usual[cell["target"]])}',
              'suppressed': _of(cell['suppressed'], cell['found_clean']),
              'invented': _of(cell['invented'], cell['silent_clean']),
              'certainly elsewhere': wording.mean_count(cell['invented_elsewhere'])}
@@ -76,7 +77,8 @@ def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], u
               if all(cell[name] == usual[name] for name in ('nodes', 'threshold', 'judged'))}
     at = {(*(cell[name] for name in ATTACK), cell['sequence']): cell for cell in cells}
     head = [f'`{target}`', 'frames', 'edits', 'queries', *sequences, 'mean', 'of the optimum']
-    lines = [_line(head), _line('---' for _ in head),
+    lines = [f'Unless said otherwise: {usual_title(usual)}.\n',
+             _line(head), _line('---' for _ in head),
              _line(['before', '', '', '', *(wording.percent(before.get(name))
                                             for name in sequences), '', ''])]
     for method in sorted(methods, key=lambda method: (

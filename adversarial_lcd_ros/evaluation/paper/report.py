@@ -10,16 +10,17 @@ cells, so it can be written anew at any time, also while cells are missing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals, wording
-from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
-from adversarial_lcd_ros.evaluation.paper import curves, tables, verdicts
+from adversarial_lcd_ros.evaluation.page import WIDE, data_uri, load_template
+from adversarial_lcd_ros.evaluation.paper import headline, tables, verdicts
 from adversarial_lcd_ros.evaluation.paper import plots as paper_plots
+from adversarial_lcd_ros.evaluation.paper.drawn import first_of_targets, plot, report_plots
 from adversarial_lcd_ros.evaluation.paper.exports import write_exports
 from adversarial_lcd_ros.evaluation.paper.markdown import markdown_tables, one_sided_rows
 from adversarial_lcd_ros.evaluation.paper.printed import PRINTED_TABLES, misprints
@@ -29,8 +30,8 @@ from adversarial_lcd_ros.evaluation.paper.summaries import (
     summarise_methods,
 )
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
-from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
-from adversarial_lcd_ros.evaluation.pictures import read_pictures
+from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_by_target, usual_title
+from adversarial_lcd_ros.evaluation.pictures import read_pictures, read_why
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.writing import write_text
@@ -39,7 +40,6 @@ TABLES_MD = 'tables.md'
 _PICTURES = 6
 _BESIDE = 6.4  # inches
 _MANY_COLUMNS = 6
-Plot = dict[str, str]
 
 
 def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
@@ -73,77 +73,57 @@ def write_paper_report(folder: Path, rows: Sequence[Row]) -> Path:
                 for title, caption, data in read_pictures(folder)[:_PICTURES]]
     path = folder / REPORT
     write_text(path, load_template('paper.html.j2').render(
-        {**_values(rows, cells, groups), 'pictures': pictures}))
+        {**_values(rows, cells, groups), 'pictures': pictures, 'why': _why(folder)}))
     return path
+
+
+def _why(folder: Path) -> dict[str, Any] | None:
+    found = read_why(folder)
+    return found and {**found, **{name: data_uri(found[name], 'jpeg')
+                                  for name in ('wide', 'narrow')}}
 
 
 def _values(rows: Sequence[Row], cells: Sequence[Summary],
             groups: Sequence[list[DeclineTable]]) -> dict[str, Any]:
     ratio = tables.main_ratio(cells)
     methods = summarise_methods(cells)
-    usual = usual_settings(cells)
+    usual = usual_by_target([cell for cell in cells if cell['ratio'] == ratio])
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
-        'headline': verdicts.headline(methods, ratio, cells),
-        'best': verdicts.strongest(here, verdicts.main_target(here)),
+        'headline': headline.headline(methods, ratio, cells),
+        'best': headline.strongest(here, headline.main_target(here)),
         'warnings': verdicts.warnings(cells, groups[0] + groups[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
         'sequences': _sequences(cells), 'methods': _methods(here, usual),
-        'usual': usual_title(usual),
-        'verdicts': [(name, verdicts.verdict(group[0])) for name, group in zip(
-            ('Surrogates', 'Perturbations'), groups, strict=False) if group],
+        'usual': {target: usual_title(of) for target, of in usual.items()},
+        'verdicts': [(f'{name}, {_short(table)}', verdicts.verdict(table)) for name, group in zip(
+            ('Surrogates', 'Perturbations', 'Budgets'), groups, strict=True)
+            for table in first_of_targets(group)],
         'surrogates': _blocks(groups[0]), 'perturbations': _blocks(groups[1]),
         'budgets': _blocks(groups[2]), 'notes': _notes(),
         'one_sided': one_sided_rows([cell for cell in cells if cell['ratio'] == ratio], usual),
         'cells': _cells([cell for cell in cells if cell['ratio'] == ratio], usual),
-        'block_s': intervals.BLOCK_S, **_plots(rows, cells, groups, ratio)}
-
-
-def _plots(rows: Sequence[Row], cells: Sequence[Summary], groups: Sequence[list[DeclineTable]],
-           ratio: float) -> dict[str, Any]:
-    values: dict[str, Any] = dict.fromkeys(
-        ('budget_plot', 'success_plot', 'success_setting', 'share_plot', 'map_plot', 'transfer'))
-    if groups[2]:
-        values['budget_plot'] = _plot(lambda width: paper_plots.budget_curves(groups[2][0], width))
-    # Of the perturbations' setting, or else of the surrogates'; of query-guided attacks.
-    settings = [table.setting for group in groups[1::-1] for table in group]
-    guided = next((setting for setting in settings if setting['mode'] == 'query'), None)
-    if guided is not None:
-        successes = curves.query_curves(rows, guided, ratio)
-        if successes:
-            values['success_plot'] = _plot(
-                lambda width: paper_plots.success_curves(successes, width))
-            values['success_setting'] = tables.setting_title(guided)
-    if settings:
-        shares, methods_of = curves.optimum_shares(cells, settings[0], ratio)
-        if shares:
-            values['share_plot'] = _plot(
-                lambda width: paper_plots.optimum_shares(shares, methods_of, width))
-    targets = curves.target_map(cells, ratio)
-    if targets is not None:
-        values['map_plot'] = _plot(lambda width: paper_plots.heat_map(
-            targets.attacks, targets.targets, targets.declines, width))
-        values['transfer'] = targets.transfer
-    return values
-
-
-def _plot(draw: Callable[[float], bytes], wide: float = WIDE) -> Plot:
-    return {name: data_uri(draw(width), 'svg+xml')
-            for name, width in (('wide', wide), ('narrow', NARROW))}
+        'block_s': intervals.BLOCK_S, **report_plots(rows, cells, groups, ratio)}
 
 
 def _blocks(tables: Sequence[DeclineTable]) -> list[dict[str, Any]]:
-    # The first comes with the paper's table: beside it, with less room, if it is narrow.
+    # The first comes with the paper's table: beside it, with less room, if it is narrow. The first
+    # of each target is open.
     blocks: list[dict[str, Any]] = []
     for table in tables:
         beside = not blocks and len(table.columns) < _MANY_COLUMNS
-        plot = None if table.ranking is None else _plot(
+        ranks = None if table.ranking is None else plot(
             partial(paper_plots.critical_difference, table.ranking),
             _BESIDE if beside else WIDE)
-        blocks.append({'table': table, 'verdict': verdicts.verdict(table), 'plot': plot,
-                       'beside': beside})
+        blocks.append({'table': table, 'verdict': verdicts.verdict(table), 'plot': ranks,
+                       'beside': beside, 'open': table in first_of_targets(tables)})
     return blocks
+
+
+def _short(table: DeclineTable) -> str:
+    judged = '' if table.setting['judged'] == 'frames' else f' by {table.setting["judged"]}'
+    return f'{table.setting["target"]}{judged}'
 
 
 def _notes() -> dict[int, list[str]]:
@@ -183,33 +163,39 @@ def _range(cells: Sequence[Summary], name: str) -> str:
     return f'{texts[0]}' if len(texts) == 1 else f'{texts[0]} to {texts[-1]}'
 
 
-def _methods(methods: Sequence[Summary], usual: Summary) -> dict[str, list[dict[str, str]]]:
+def _methods(methods: Sequence[Summary], usual: Mapping[str, Summary]
+             ) -> dict[str, list[dict[str, str]]]:
     # By target, the usual ones first; the strongest attack first.
     rows: dict[str, list[dict[str, str]]] = {}
     left = list(methods)
     while left:
-        target = verdicts.main_target(left)
+        target = headline.main_target(left)
         there = [method for method in left if method['target'] == target]
         left = [method for method in left if method['target'] != target]
         rows[str(target)] = [
-            {'attack': full_title(method, usual), 'N': str(len(method['sequences'])),
+            {'attack': _title(method, usual), 'N': str(len(method['sequences'])),
              **_figures(method), **_counts(method)}
             for method in sorted(there, key=lambda method: (-method['decline_pp'],
-                                                            full_title(method, usual)))]
+                                                            _title(method, usual)))]
     if not any(method['unattackable'] for method in methods):
         for row in (row for group in rows.values() for row in group):
             del row['unattackable']
     return rows
 
 
-def _cells(cells: Sequence[Summary], usual: Summary) -> dict[str, list[dict[str, str]]]:
+def _cells(cells: Sequence[Summary], usual: Mapping[str, Summary]
+           ) -> dict[str, list[dict[str, str]]]:
     rows: dict[str, list[dict[str, str]]] = {}
     for cell in sorted(cells, key=lambda cell: (
-            cell['target'], -(cell['decline_pp'] or 0.0), full_title(cell, usual))):
+            cell['target'], -(cell['decline_pp'] or 0.0), _title(cell, usual))):
         rows.setdefault(cell['sequence'], []).append(
-            {'target and attack': f'{cell["target"]}: {full_title(cell, usual)}',
+            {'target and attack': f'{cell["target"]}: {_title(cell, usual)}',
              **_figures(cell), **_counts(cell)})
     return {sequence: rows[sequence] for sequence in sorted(rows)}
+
+
+def _title(summary: Summary, usual: Mapping[str, Summary]) -> str:
+    return full_title(summary, usual[summary['target']])
 
 
 def _figures(summary: Summary) -> dict[str, str]:

@@ -76,6 +76,7 @@ def summarise_cells(rows: Iterable[Row]) -> list[Summary]:
         * ``ci95``: of the decline, percentage points; None if a class of frames is empty
         * ``found_clean``, ``silent_clean``: right decisions before, by class (mean over seeds)
         * ``method``: what looks for flips, a perturbation or else a search
+        * ``nodes_moved_mean``: nodes that were changed, where the rows have it
         * ``share_of_optimum``: decline over that of the yardstick on the same sequence, target,
           ratio, size of graph and threshold (the largest, if there are several); None without,
           or if the optimum takes nothing
@@ -193,6 +194,9 @@ def _summarise(rows: Sequence[Row]) -> Summary:
     seeds = [row['seed'] for row in rows]
     cell = dict(zip(CELL, _cell_key(rows[0]), strict=True))
     cell['method'] = method_of(cell)
+    moved = [row['nodes_moved_mean'] for row in rows if 'nodes_moved_mean' in row]
+    if moved:
+        cell['nodes_moved_mean'] = _mean(moved)
     if len(set(seeds)) < len(seeds):
         raise EvaluationError(f'two rows of {cell} with one seed among {seeds}: keep one of '
                               'each, or the repeats would be counted twice')
@@ -286,6 +290,7 @@ def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...]
     ci95 = intervals.mean_interval(declines)
     both = [(cell['decline_pp'], best[_yardstick(cell)]) for cell in cells
             if _yardstick(cell) in best]
+    moved = [cell['nodes_moved_mean'] for cell in cells if 'nodes_moved_mean' in cell]
     taken, possible = (math.fsum(column) for column in zip(*both, strict=True)) if both else (0, 0)
     return {
         'sequences': [cell['sequence'] for cell in cells], 'decline_pp': float(declines.mean()),
@@ -293,6 +298,7 @@ def _over_sequences(cells: Sequence[Summary], best: Mapping[tuple[Hashable, ...]
         'least_pp': float(declines.min()), 'most_pp': float(declines.max()),
         'seeds': min(cell['seeds'] for cell in cells),
         'share_of_optimum': taken / possible if possible > 0 else None,
+        **({'nodes_moved_mean': _mean(moved)} if moved else {}),
         **{name: _mean(cell[name] for cell in cells)
            for name in ('accuracy_clean', 'accuracy_attacked', 'balanced_clean',
                         'balanced_attacked', 'edits_mean', 'queries_mean', 'nodes_mean',

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
+from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_facts, surrogate_facts
 from adversarial_lcd_ros.evaluation.paper.printed import (
@@ -142,14 +143,14 @@ def surrogate_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
 def perturbation_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
     """Return Table 5: perturbations, with SVM-RBF where they use a surrogate."""
     ratio = main_ratio(cells)
-    chosen = [cell for cell in _perturbations(cells) if cell['ratio'] == ratio]
+    chosen = [cell for cell in with_usual_surrogates(cells) if cell['ratio'] == ratio]
     return _tables(chosen, PERTURBATION_TABLE, 'method', method_facts)
 
 
 def budget_tables(cells: Sequence[Summary]) -> list[DeclineTable]:
     """Return Table 6: perturbations by ratio, means over the sequences."""
     tables = []
-    for setting, group in _by_setting(_perturbations(cells)):
+    for setting, group in _by_setting(with_usual_surrogates(cells)):
         ratios = sorted({cell['ratio'] for cell in group})
         if len(ratios) < 2:
             continue
@@ -169,9 +170,13 @@ def _native(cells: Sequence[Summary]) -> list[Summary]:
             if cell['asked_target'] == cell['target'] and cell['mode'] != 'pass']
 
 
-def _perturbations(cells: Sequence[Summary]) -> list[Summary]:
-    # The paper's perturbations come with SVM-RBF; one that has no such cell comes as it is, if
-    # there is only one way.
+def with_usual_surrogates(cells: Sequence[Summary]) -> list[Summary]:
+    """
+    Return the cells of each method with the paper's surrogate.
+
+    The paper's perturbations come with SVM-RBF; one that has no such cell comes as it is, if there
+    is only one way.
+    """
     native = _native(cells)
     ways: dict[tuple[Hashable, ...], set[str]] = {}
     for cell in native:
@@ -191,9 +196,16 @@ def _by_setting(cells: Sequence[Summary]) -> list[tuple[Summary, list[Summary]]]
     for cell in cells:
         groups.setdefault(tuple(cell[name] for name in SETTING), []).append(cell)
     known = {name: place for place, name in enumerate(TARGETS)}
-    order = sorted(groups, key=lambda key: (-len(groups[key]), known.get(str(key[0]), len(known)),
-                                            str(key)))
+    order = sorted(groups, key=lambda key: (-len(groups[key]), _unusual(key),
+                                            known.get(str(key[0]), len(known)), key))
     return [(dict(zip(SETTING, key, strict=True)), groups[key]) for key in order]
+
+
+def _unusual(key: Sequence[Hashable]) -> int:
+    """Return how many settings of an attack are not its defaults."""
+    setting = dict(zip(SETTING, key, strict=True))
+    return sum((setting['queries_per_edit'] != AttackConfig.queries_per_edit,
+                setting['edits'] != AttackConfig.edits, bool(setting['variant'])))
 
 
 def _tables(cells: Sequence[Summary], printed: PrintedTable, column: str,

@@ -25,6 +25,12 @@ def usual_settings(cells: Sequence[Summary]) -> dict[str, Any]:
             for name, count in counts.items()}
 
 
+def usual_by_target(cells: Sequence[Summary]) -> dict[str, dict[str, Any]]:
+    """Return the usual settings of each target: one may be attacked by pairs, another not."""
+    return {target: usual_settings([cell for cell in cells if cell['target'] == target])
+            for target in dict.fromkeys(cell['target'] for cell in cells)}
+
+
 def usual_title(usual: Summary) -> str:
     """Return the usual settings in words."""
     return ', '.join(words.format(usual[name]) for name, words in _WORDS.items()

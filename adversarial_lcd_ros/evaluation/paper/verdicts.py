@@ -1,103 +1,23 @@
 # Copyright 2026 adversarial_lcd_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the paper's experiments gave here, in plain sentences computed from the cells."""
+"""What became of the paper's claims, and what to know first, in sentences made of the cells."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.methods import is_yardstick
+from adversarial_lcd_ros.evaluation.paper.headline import TIE_PP
 from adversarial_lcd_ros.evaluation.paper.printed import BUDGET_TABLE
 from adversarial_lcd_ros.evaluation.paper.ranks import Ranking
 from adversarial_lcd_ros.evaluation.paper.summaries import Summary, is_attackable
 from adversarial_lcd_ros.evaluation.paper.tables import DeclineTable
-from adversarial_lcd_ros.registry import TARGETS
 
 PAPER_SEEDS = 10
 _FEW_FRAMES = 30
 _MANY_TABLES = 3
-_TIE_PP = 0.05  # what is printed as equal is equal
-
-
-def strongest(methods: Sequence[Summary], target: str | None = None) -> Summary | None:
-    """
-    Return the black-box attack with the largest mean decline; None without any.
-
-    Of the size of graph and the threshold that most attacks have: others are experiments of their
-    own, often on few frames.
-
-    Parameters
-    ----------
-    methods : sequence of dict
-        From ``summarise_methods``. The yardstick does not count, nor does an attack that asked
-        another target than it attacks.
-    target : str
-        Only attacks on this one.
-
-    """
-    there = [method for method in methods
-             if not is_yardstick(method) and method['asked_target'] == method['target']
-             and method['mode'] != 'pass' and target in (None, method['target'])]
-    kinds = Counter(map(_kind_of, there)).most_common(1)
-    there = [method for method in there if _kind_of(method) == kinds[0][0]]
-    return max(there, key=lambda method: method['decline_pp'], default=None)
-
-
-def _kind_of(method: Summary) -> tuple[Any, ...]:
-    """Return what declines hang on most, whatever the attack."""
-    return method['nodes'], method['threshold'], method['judged']
-
-
-def main_target(methods: Sequence[Summary]) -> str | None:
-    """Return the first target, in the usual order, that was attacked."""
-    there = {method['target'] for method in methods}
-    return next((name for name in (*TARGETS, *sorted(there)) if name in there), None)
-
-
-def headline(methods: Sequence[Summary], ratio: float, cells: Sequence[Summary] = ()) -> str:
-    """Return the main finding at a perturbation ratio in one or two sentences."""
-    here = [method for method in methods if method['ratio'] == ratio]
-    target = main_target(here)
-    best = strongest(here, target)
-    if best is None:
-        return ('No attack was measured on a sequence with both loops and new places.'
-                f'{_without_decline([cell for cell in cells if cell["ratio"] == ratio])}')
-    count = len(best['sequences'])
-    over = 'one sequence' if count == 1 else f'{count} sequences'
-    title = f'{wording.attack_title({**best, "name": None})}, {best["nodes"]} features'
-    bounds = best['ci95']
-    interval = f' (95 % interval over sequences {wording.interval(bounds)})' if bounds else ''
-    accuracy = (f'from {wording.percent(best["balanced_clean"])} to '
-                f'{wording.percent(best["balanced_attacked"])}')
-    share = best['share_of_optimum']
-    yardstick = '' if share is None else (f' That is {wording.percent(share, 0)} of what the '
-                                          'greedy optimum over all flips takes.')
-    if best['decline_pp'] < _TIE_PP:
-        return (f'No black-box attack lowered the balanced accuracy of {target} on {over} at '
-                f'r = {ratio:g}; the strongest was {title}, {accuracy}.')
-    doubt = (' So few sequences leave open whether it holds on others.'
-             if bounds and bounds[0] <= 0 else
-             ' One sequence says nothing about others.' if bounds is None else '')
-    return (f'At r = {ratio:g} the strongest black-box attack on target {target} ({title}) took '
-            f'{wording.points(best["decline_pp"])} points of balanced accuracy on average over '
-            f'{over}{interval}, {accuracy}.{doubt}{yardstick}')
-
-
-def _without_decline(cells: Sequence[Summary]) -> str:
-    best = max((cell for cell in cells if cell['decline_pp'] is None and not is_yardstick(cell)),
-               key=lambda cell: cell['suppressed'] + cell['invented'], default=None)
-    if best is None:
-        return ''
-    return (f' The strongest, {wording.attack_title({**best, "name": None})} on target '
-            f'{best["target"]}, suppressed {wording.mean_count(best["suppressed"])} of '
-            f'{wording.mean_count(best["found_clean"])} loops found on {best["sequence"]}, and '
-            f'invented {wording.mean_count(best["invented"])} in '
-            f'{wording.mean_count(best["silent_clean"])} new places left alone.')
 
 
 def verdict(table: DeclineTable) -> str:
@@ -116,12 +36,12 @@ def verdict(table: DeclineTable) -> str:
     ours = sorted(expected, key=lambda value: (-declines[value], expected.index(value)))
     named = _order([heading[value] for value in ours], [declines[value] for value in ours])
     theirs = ' > '.join(heading[value] for value in expected)
-    if abs(declines[ours[0]] - declines[ours[-1]]) < _TIE_PP:
+    if abs(declines[ours[0]] - declines[ours[-1]]) < TIE_PP:
         return (f"The paper's ranking ({theirs}) does not come out: all took the same, "
                 f'{wording.points(declines[ours[0]])} points.')
-    in_order = all(declines[first] - declines[second] >= _TIE_PP
+    in_order = all(declines[first] - declines[second] >= TIE_PP
                    for first, second in pairwise(expected))
-    leads = all(declines[expected[0]] - declines[other] >= _TIE_PP for other in expected[1:])
+    leads = all(declines[expected[0]] - declines[other] >= TIE_PP for other in expected[1:])
     if in_order:
         start = f"The paper's ranking comes out in the means: {named}"
     elif leads:
@@ -144,7 +64,7 @@ def _budget_verdict(table: DeclineTable) -> str:
                     if entry and value in paper}
         if set(declines) == set(paper):
             ratios += 1
-            leads += all(declines[ahead] - declines[value] >= _TIE_PP
+            leads += all(declines[ahead] - declines[value] >= TIE_PP
                          for value in paper if value != ahead)
     title = dict(zip(table.values, table.columns, strict=True))[ahead]
     return (f"Of the paper's perturbations {title} takes most at {leads} of {ratios} ratios here; "
@@ -155,7 +75,7 @@ def _order(names: Sequence[str], declines: Sequence[float]) -> str:
     # Names with their declines, the strongest first; equal to the printed digit: "=".
     parts = [f'{names[0]} {wording.points(declines[0])}']
     for (before, decline), name in zip(pairwise(declines), names[1:], strict=True):
-        sign = '=' if before - decline < _TIE_PP else '>'
+        sign = '=' if before - decline < TIE_PP else '>'
         parts.append(f'{sign} {name} {wording.points(decline)}')
     return ' '.join(parts)
 
