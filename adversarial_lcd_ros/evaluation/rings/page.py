@@ -117,7 +117,7 @@ def _details(rows: Sequence[Summary]) -> list[str]:
 
 def _posters(rows: Sequence[Summary]) -> list[str]:
     targets = list(dict.fromkeys(row['target'] for row in rows))
-    checks = list(dict.fromkeys(row['check'] for row in rows))
+    checks = sorted(dict.fromkeys(row['check'] for row in rows), key=lambda name: name != 'none')
     cell = {(row['sequence'], poster_title(row), row['target'], row['check']): row for row in rows}
     lines = []
     order = {BARE: 0, SAME: 1, OTHER: 2}
