@@ -122,7 +122,7 @@ def draw_why(why: Why, name: str = WHY) -> bytes:
 
 def _panels(seen: Sensitivity) -> Iterator[_Panel]:
     for name, pairs in seen.asked.items():
-        yield f'{name}\nbest takes {_number(_best(seen, pairs))}', pairs, False
+        yield f'{name}\nbest of {len(pairs)} takes {_number(_best(seen, pairs))}', pairs, False
     yield (f'what it feels: {100 * seen.felt:.0f} % of all flips\n'
            f'strongest takes {_number(float(seen.taken.max()))}', seen.strongest, True)
 
