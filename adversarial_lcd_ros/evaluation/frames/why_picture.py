@@ -63,7 +63,8 @@ def caption(why: Why) -> str:
     """Return what the picture is of."""
     graph = why.targets[0].graph
     against = ('one given reference' if why.judged == 'pairs' else 'the map')
-    return (f'{why.stream.name}, frame {graph.sequence}, a loop that both targets find, judged '
+    who = 'both targets find' if len(why.targets) > 1 else 'the target finds'
+    return (f'{why.stream.name}, frame {graph.sequence}, a loop that {who}, judged '
             f'against {against}; {graph.node_count} nodes, {why.edits} edits allowed. Columns 1 '
             f'to 3: the first {ASKED} flips that an attack asks about. Column 4: the {ASKED} '
             'flips that take most, and nodes the larger the more the answer changes by all flips '
