@@ -210,6 +210,13 @@ def test_headline_says_whose_what_the_papers_took_and_where_it_works():
     assert "The paper's own (" not in alone
 
 
+def test_of_attacks_that_took_the_same_the_usual_one_is_named():
+    rows = [make_row(queries_per_edit=count, variant=variant, power=0.0)
+            for count in (1, 40) for variant in ('', 'retry never')]
+    assert 'was eigencentrality + SVM-RBF, query-guided, 300 features' in words_of(rows)
+    assert 'query-guided, 1 query an edit, 300 features' in words_of(rows[:1])
+
+
 def test_the_first_table_of_each_target_is_open(tmp_path):
     rows = [make_row(sequence, target, name, 'svm_rbf', judged=judged, queries_per_edit=queries)
             for sequence in SEQUENCES[:2]

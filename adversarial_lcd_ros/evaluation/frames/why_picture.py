@@ -25,8 +25,9 @@ from adversarial_lcd_ros.evaluation.results import PICTURES
 from adversarial_lcd_ros.files.writing import write_bytes, write_json
 from adversarial_lcd_ros.graph import MultiTierGraph
 
-_DPI = 130
-_PANEL_IN = {WHY: 3.3, WHY_NARROW: 2.6}  # width
+_PANEL_IN = {WHY: 3.3, WHY_NARROW: 2.1}  # width
+_DPI = {WHY: 130, WHY_NARROW: 170}
+_FONT = {WHY: 9.0, WHY_NARROW: 8.0}
 _COLUMNS = {WHY: 4, WHY_NARROW: 2}
 _FADED = 0.62  # of the camera picture towards white
 # What takes nothing is grey, what takes most is dark red.
@@ -63,9 +64,10 @@ def caption(why: Why) -> str:
     """Return what the picture is of."""
     graph = why.targets[0].graph
     against = ('one given reference' if why.judged == 'pairs' else 'the map')
-    return (f'{why.stream.name}, frame {graph.sequence}, a loop that both targets find, judged '
-            f'against {against}; {graph.node_count} nodes, {why.edits} edits allowed. Columns 1 '
-            f'to 3: the first {ASKED} flips that an attack asks about. Column 4: the {ASKED} '
+    who = 'both targets find' if len(why.targets) > 1 else 'the target finds'
+    return (f'{why.stream.name}, frame {graph.sequence}, a loop that {who}, judged '
+            f'against {against}; {graph.node_count} nodes, {why.edits} edits allowed. Three '
+            f'panels: the first {ASKED} flips that an attack asks about. The last: the {ASKED} '
             'flips that take most, and nodes the larger the more the answer changes by all flips '
             'there. Colour: log odds taken, from none (grey) to what each edit has to take on '
             'average to turn the decision over, or more (dark red).')
@@ -102,15 +104,15 @@ def draw_why(why: Why, name: str = WHY) -> bytes:
     graph = why.targets[0].graph
     height = width * graph.height / graph.width + 0.55
     rows = per_target * len(why.targets)
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context({**STYLE, 'axes.titlesize': _FONT[name]}):
         figure = Figure(figsize=(columns * width, rows * height + 0.2 * len(why.targets)),
-                        layout='constrained', dpi=_DPI)
+                        layout='constrained', dpi=_DPI[name])
         parts = np.atleast_1d(figure.subfigures(len(why.targets), 1))
         for part, seen in zip(parts, why.targets, strict=True):
             needed = _needed(why, seen)
             part.suptitle(
                 f'target {seen.target}: each edit has to take {_number(needed)} log odds',
-                fontsize=10.5, fontweight='bold', x=0.01, ha='left')
+                fontsize=_FONT[name] + 1.0, fontweight='bold', x=0.01, ha='left')
             image = _faded(frame_image(why.stream, seen.graph))
             for axes, panel in zip(part.subplots(per_target, columns).ravel(), _panels(seen),
                                    strict=True):
@@ -122,7 +124,7 @@ def draw_why(why: Why, name: str = WHY) -> bytes:
 
 def _panels(seen: Sensitivity) -> Iterator[_Panel]:
     for name, pairs in seen.asked.items():
-        yield f'{name}\nbest takes {_number(_best(seen, pairs))}', pairs, False
+        yield f'{name}\nbest of {len(pairs)} takes {_number(_best(seen, pairs))}', pairs, False
     yield (f'what it feels: {100 * seen.felt:.0f} % of all flips\n'
            f'strongest takes {_number(float(seen.taken.max()))}', seen.strongest, True)
 
@@ -139,7 +141,7 @@ def _draw(axes: Any, image: NDArray[np.uint8], seen: Sensitivity, needed: float,
         graph.position[pairs[order]], colors=_PALETTE(share[order]),
         linewidths=0.8 + 1.0 * share[order]))
     _nodes(axes, graph, seen.at_node if with_nodes else None)
-    axes.set_title(title, fontsize=9.0, color=INK)
+    axes.set_title(title, color=INK)
     axes.set(xlim=(0, graph.width), ylim=(graph.height, 0), xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
 

@@ -43,7 +43,10 @@ def strongest(methods: Sequence[Summary], target: str | None = None) -> Summary 
              and method['mode'] != 'pass' and target in (None, method['target'])]
     kinds = Counter(map(_kind_of, there)).most_common(1)
     there = [method for method in there if _kind_of(method) == kinds[0][0]]
-    return max(there, key=lambda method: method['decline_pp'], default=None)
+    # Of those that took the same the one with the usual settings.
+    return max(there, key=lambda method: (method['decline_pp'], method['queries_per_edit']
+                                          == AttackConfig.queries_per_edit,
+                                          not method['variant']), default=None)
 
 
 def _kind_of(method: Summary) -> tuple[Any, ...]:
@@ -132,8 +135,9 @@ def _papers_own(methods: Sequence[Summary], best: Summary) -> str:
 
 def _name(method: Summary) -> str:
     """Return what an attack is, with what is not usual about it."""
-    queries = (f', {method["queries_per_edit"]} queries an edit' if method['mode'] == 'query'
-               and method['queries_per_edit'] != AttackConfig.queries_per_edit else '')
+    count = method['queries_per_edit']
+    queries = (f', {count} {"query" if count == 1 else "queries"} an edit'
+               if method['mode'] == 'query' and count != AttackConfig.queries_per_edit else '')
     variant = f', {method["variant"]}' if method['variant'] else ''
     return f'{wording.attack_title({**method, "name": None})}{queries}{variant}'
 
