@@ -71,7 +71,9 @@ def _neighbour_edges(position: NDArray[np.float32], neighbours: int) -> NDArray[
     if nearest < 2:
         return np.zeros((0, 2), np.int64)
     _, near = cKDTree(position).query(position, nearest)
-    pairs = np.stack([np.repeat(np.arange(count), nearest), near.ravel()], axis=1)
-    # Features of several octaves share a place: a feature need not be its own first neighbour.
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    # Features of several octaves share a place: a feature need not be its own first neighbour,
+    # and where more than k others do, none of its own neighbours; then one of those goes.
+    own = near == np.arange(count)[:, None]
+    own[~own.any(axis=1), -1] = True
+    pairs = np.stack([np.repeat(np.arange(count), nearest - 1), near[~own]], axis=1)
     return np.sort(pairs, axis=1).astype(np.int64)

@@ -6,7 +6,7 @@
 from itertools import combinations
 
 import cv2
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -117,6 +117,7 @@ boxes = st.tuples(st.integers(0, 600), st.integers(0, 440), st.integers(1, 40),
 
 
 @settings(max_examples=60)
+@example([(0, 0)] * 4, [], 1)
 @given(st.lists(places, max_size=25), st.lists(boxes, max_size=5), st.integers(0, 5))
 def test_the_rules_hold_for_any_scene(features, objects, neighbours):
     graph = assembled(features, objects, neighbours)

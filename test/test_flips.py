@@ -14,7 +14,7 @@ import pytest
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.lcd.decision import Decision
+from adversarial_lcd_ros.lcd.decision import KEPT_PERCENT, Decision
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import FlipScorer, flip_logits
 from adversarial_lcd_ros.lcd.targets import TARGETS
@@ -131,7 +131,8 @@ def test_without_a_candidate_no_flip_makes_a_loop(make_detector):
 def tour(tmp_path):
     """Return a detector of edges with some settings and two keyframes, and a graph to judge."""
     path = tmp_path / 'model.json'
-    Decision('edges', ('edges',), (10.0,), -4.0).save(path)
+    Decision('edges', ('edges',), (10.0,), -4.0,
+             tuple(np.linspace(3, -2, len(KEPT_PERCENT)))).save(path)
     rng = np.random.default_rng(0)
     edges = [(k % 3, k) for k in range(5, 20)] + [(k, k + 1) for k in range(3, 19)]
     graph = replace(make_graph(20, edges, objects=3), stamp_ns=10**12)

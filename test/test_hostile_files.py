@@ -76,7 +76,7 @@ def test_recipe_that_is_none(tmp_path, refused, text, message):
     (f'{BOMB}lcd: *j', 'more than 50000 values'),
     ('lcd: {threshold: .nan}', 'no finite number'),
     ('lcd: {model: 2024-01-01}', 'expected str'),
-    ('1: {a: 2}', "unknown section '1'"),
+    ('1: {a: 2}', 'unknown section 1'),
     ('lcd: {"\\e[1m": 1}', 'unknown setting \\x1b[1m'),
 ])
 def test_settings_that_are_none(tmp_path, refused, text, message):

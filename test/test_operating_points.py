@@ -59,18 +59,28 @@ def test_each_point_keeps_its_share_and_no_higher_one_would(loops):
         assert fewer - 1e-6 < share <= kept + 1e-6
 
 
-@pytest.mark.parametrize('share', [0.5, 0.9, 0.95, 1.0])
+@pytest.mark.parametrize('share', [0.5, 0.9, 0.95, 0.99, 1.0])
 def test_a_decision_moves_to_its_point_and_no_further(share):
     loops = [np.linspace(-3, 40, 87)]
     fitted = with_operating_points(Decision('vbow', ('words',), (10.0,), -4.0), loops, 3.0)
     moved = fitted.keeping(share)
-    assert moved.bias == pytest.approx(-4 - at(fitted.operating_points, share))
+    assert moved.bias == pytest.approx(-4 - max(at(fitted.operating_points, share), 0))
     assert moved.weights == fitted.weights
     assert moved.keeping(share).bias == pytest.approx(moved.bias)
     told = fitted.card['operating_points']
     assert told['loops'] == [87]
     assert told['min_gap_s'] == 3
     assert told['log_odds']['0.95'] == at(fitted.operating_points, 0.95)
+
+
+def test_the_line_is_never_lowered():
+    # 99 % of these loops lie above -20, where everything passes.
+    weak = with_operating_points(Decision('vbow', ('words',), (10.0,), -4.0),
+                                 [np.linspace(-20, 5, 100)], 3.0)
+    assert at(weak.operating_points, 0.99) < -4
+    assert weak.keeping(0.99).bias == -4
+    assert weak.keeping(0.99).logit([0.0]) < 0
+    assert weak.keeping(0.5).keeping(0.99).bias == weak.keeping(0.5).bias
 
 
 def test_a_detector_is_at_the_point_of_its_settings(tmp_path):

@@ -25,7 +25,7 @@ from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 
 COUNT = 24
 # The target that flips of edges turn over on graphs as random as these.
-LCD = LcdConfig(min_gap_s=2.0, target='anchored')
+LCD = LcdConfig(min_gap_s=2.0, target='anchored', kept_loops=0.95)
 
 
 @pytest.fixture(scope='module')
@@ -60,7 +60,8 @@ def payload(data):
 
 def evaluate(bag, tmp_path, *options):
     code = main(['evaluate', str(bag), '--output', str(tmp_path / 'results'),
-                 '--lcd-min-gap-s', '2.0', '--lcd-target', 'anchored', *options])
+                 '--lcd-min-gap-s', '2.0', '--lcd-target', 'anchored',
+                 '--lcd-kept-loops', '0.95', *options])
     assert code == 0
     folder = (tmp_path / 'results' / 'latest').resolve()
     return json.loads((folder / 'summary.json').read_text()), (folder / 'report.html').read_text()

@@ -86,7 +86,9 @@ class Decision:
         """
         Return the decision with log odds 0 where it keeps a share of the training loops.
 
-        A decision without operating points stays as it was fitted.
+        The line is only raised: where the fit has loops and others equally likely is its least,
+        since among the loops of a weak target are some that nothing speaks for. A decision without
+        operating points stays as it was fitted.
 
         Parameters
         ----------
@@ -96,7 +98,7 @@ class Decision:
         """
         if not self.operating_points:
             return self
-        point = float(np.interp(100 * share, KEPT_PERCENT, self.operating_points))
+        point = max(float(np.interp(100 * share, KEPT_PERCENT, self.operating_points)), 0.0)
         return replace(self, bias=self.bias - point,
                        operating_points=tuple(odds - point for odds in self.operating_points))
 
