@@ -89,7 +89,7 @@ def test_a_recording_is_reported_as_it_is(run, tmp_path, capsys):
 
 
 def test_other_settings_are_noticed(run, tmp_path):
-    summary, _ = evaluate(record(tmp_path / 'bag', run), tmp_path, '--lcd-threshold', '0.001')
+    summary, _ = evaluate(record(tmp_path / 'bag', run), tmp_path, '--lcd-kept-loops', '0.5')
     assert 'had other settings' in summary['notes'][-1]
 
 
