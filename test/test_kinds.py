@@ -118,6 +118,15 @@ def test_compare_tells_what_changed(tmp_path, capsys, kind):
     xml.etree.ElementTree.parse(tmp_path / 'results' / 'comparison.svg')
 
 
+def test_a_report_tells_what_differs_elsewhere(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    first, second = replay(tmp_path / 'a'), replay(tmp_path / 'b', found=range(40, 60))
+    assert main(['compare', str(first), str(second)]) == 0
+    compared = capsys.readouterr().out
+    assert main(['report', str(first), '--compare', str(second)]) == 0
+    assert capsys.readouterr().out == f'{first / "report.html"}\n{compared}'
+
+
 def test_figures_of_a_comparison_are_those_of_the_runs(tmp_path):
     found = compare([targets_folder(tmp_path / 'a'), targets_folder(tmp_path / 'b', accuracy=0.5)])
     line = found.figures[0]

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.comparison import Comparison, Difference
     from adversarial_lcd_ros.evaluation.kinds.base import Figure
 
+PICTURE = Path('results/comparison.svg')
+
 
 def add(commands: Commands) -> None:
     """Declare the command."""
@@ -31,22 +34,28 @@ def add(commands: Commands) -> None:
         'figures, settings, versions.', _compare)
     parser.add_argument('folders', type=Path, nargs='+', metavar='RESULTS',
                         help='results folders; the others are compared with the first')
-    parser.add_argument('--picture', type=Path, default=Path('results/comparison.svg'),
+    parser.add_argument('--picture', type=Path, default=PICTURE,
                         metavar='FILE', help='the main figures with their intervals, as SVG '
                         '(default: %(default)s)')
     add_json_option(parser)
 
 
 def _compare(options: Namespace) -> None:
+    compare_folders(options.folders, options.picture, as_json=options.json)
+
+
+def compare_folders(folders: Sequence[Path], path: Path = PICTURE, *,
+                    as_json: bool = False) -> None:
+    """Print what changed between results folders, and write the picture of it."""
     from adversarial_lcd_ros.evaluation.comparison import compare
 
-    if options.picture.suffix != '.svg':
-        raise ConfigError(f'--picture {options.picture}: expected a name that ends in .svg')
-    comparison = compare(options.folders)
+    if path.suffix != '.svg':
+        raise ConfigError(f'--picture {path}: expected a name that ends in .svg')
+    comparison = compare(folders)
     for warning in comparison.warnings:
         tell(f'warning: {warning}')
-    picture = _write_picture(comparison, options.picture)
-    if options.json:
+    picture = _write_picture(comparison, path)
+    if as_json:
         print_json({**comparison.as_dict(), 'picture': str(picture) if picture else None})
         return
     _show(comparison)

@@ -9,6 +9,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from adversarial_lcd_ros.commands.common import Commands, add_command, tell
+from adversarial_lcd_ros.commands.compare import compare_folders
 from adversarial_lcd_ros.errors import ConfigError
 
 
@@ -21,6 +22,8 @@ def add(commands: Commands) -> None:
     parser.add_argument('--archive', type=Path, metavar='FILE',
                         help='write the results, and the cells that they are made of, into one '
                         'file (.jsonl.xz)')
+    parser.add_argument('--compare', type=Path, nargs='+', metavar='RESULTS',
+                        help='also tell what differs in these results folders, as "compare" does')
     parser.add_argument('--output', type=Path, metavar='FOLDER',
                         help='new folder for an archived run (default: results/ and the name of '
                         'the file)')
@@ -46,6 +49,8 @@ def _report(options: Namespace) -> None:
 
         pack_results(folder, options.archive)
         print(options.archive)
+    if options.compare:
+        compare_folders([folder, *options.compare])
 
 
 def _unpacked(path: Path, output: Path | None) -> Path:
