@@ -282,6 +282,10 @@ def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
     assert "The attack recall, this project's own, took 20.0 points" in text
     assert f"The paper's own (eigen) took {wording.points(eigen['decline_pp'])} points" in text
     assert "The attack eigen, the paper's, took" in wording.headline(summary)
+    unsure = {**ours, 'decline_ci95': (0.0, 30.0)}
+    text = wording.headline({**summary, 'attacks': [eigen, unsure]})
+    assert "The strongest, recall, this project's own, changed it" in text
+    assert "The paper's own (eigen) took" in text
 
 
 def test_the_owner_of_an_attack_comes_from_its_class():

@@ -112,10 +112,11 @@ def headline(summary: Mapping[str, Any]) -> str:
     bounds = attack['decline_ci95']
     if bounds is not None and bounds[0] <= 0:
         return (f'No attack lowered the balanced accuracy on {name} beyond chance. The strongest, '
-                f'{attack_title(attack)}, changed it from {percent(clean["balanced_accuracy"])} '
+                f'{attack_title(attack)}{_owner(attack)}, changed it from '
+                f'{percent(clean["balanced_accuracy"])} '
                 f'to {percent(attack["balanced_accuracy"])}: a decline of '
                 f'{points(attack["decline_pp"])} points (95{_NARROW_SPACE}% interval '
-                f'{interval(bounds)}), with {effort}.')
+                f'{interval(bounds)}), with {effort}.{_papers_own(summary, attack)}')
     return (f'{_subject(attack)} took {points(attack["decline_pp"])} points off the balanced '
             f'accuracy of loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
             f'{percent(attack["balanced_accuracy"])} (95{_NARROW_SPACE}% interval of the decline '
@@ -125,8 +126,13 @@ def headline(summary: Mapping[str, Any]) -> str:
 
 def _subject(attack: Attack) -> str:
     """Return the attack of a headline: its name, and whose it is."""
+    owner = _owner(attack)
+    return f'The attack {attack_title(attack)}{owner}{"," if owner else ""}'
+
+
+def _owner(attack: Attack) -> str:
     owner = {'paper': "the paper's", 'ours': "this project's own"}.get(whose(attack))
-    return f'The attack {attack_title(attack)}{f", {owner}," if owner else ""}'
+    return f', {owner}' if owner else ''
 
 
 def _papers_own(summary: Mapping[str, Any], strongest_attack: Attack) -> str:
