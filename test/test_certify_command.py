@@ -3,34 +3,17 @@
 
 """The command "certify": which decisions of a sequence no few flips can turn over."""
 
-from contextlib import contextmanager
 import json
 
 import pytest
-from walk_factory import walk_folder
-
-from adversarial_lcd_ros.cli import main
-from adversarial_lcd_ros.evaluation import workers
+from walk_factory import command_on_a_walk
 
 
 @pytest.fixture
 def command(tmp_path, vocabulary, monkeypatch):
     """Return a function that runs the command on a short walk, in this process."""
-    @contextmanager
-    def one_process(jobs):
-        yield map
-    monkeypatch.setattr(workers, 'local_workers', one_process)
-    walk_folder(tmp_path / 'walk')
-    settings = {
-        'cache': tmp_path / 'cache', 'output': tmp_path / 'out', 'budget': 5,
-        'builder-detector': 'none', 'builder-vocabulary': vocabulary, 'builder-features': 20,
-        'builder-detected-features': 60, 'lcd-min-gap-s': 0.1, 'lcd-map-window': 0,
-        'label-rule': 'distance', 'label-min-gap-s': 0.1}
-
-    def run(*more):
-        options = [text for name, value in settings.items() for text in (f'--{name}', str(value))]
-        return main(['certify', str(tmp_path / 'walk'), *options, *more])
-    return run
+    return command_on_a_walk('certify', tmp_path, vocabulary, monkeypatch, budget=5,
+                             **{'builder-features': 20})
 
 
 def test_a_row_for_each_detector_with_a_share_that_falls(tmp_path, command, capsys):

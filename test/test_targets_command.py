@@ -3,15 +3,13 @@
 
 """The command "targets": figures of detectors before any attack."""
 
-from contextlib import contextmanager
 import json
 
 import pytest
-from walk_factory import walk_folder
+from walk_factory import command_on_a_walk
 
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation import workers
 from adversarial_lcd_ros.evaluation.detectors.recipe import Choices, recipe_sequences
 from adversarial_lcd_ros.evaluation.detectors.tables import target_tables
 from adversarial_lcd_ros.paths import model_path
@@ -23,21 +21,8 @@ NOTHING = Choices({}, {}, {})
 @pytest.fixture
 def command(tmp_path, vocabulary, monkeypatch):
     """Return a function that runs the command on a short walk, in this process."""
-    @contextmanager
-    def one_process(jobs):
-        yield map
-    monkeypatch.setattr(workers, 'local_workers', one_process)
-    walk_folder(tmp_path / 'walk')
-    settings = {
-        'cache': tmp_path / 'cache', 'output': tmp_path / 'out', 'nodes': 20, 'pairs': 5,
-        'draws': 2, 'builder-detector': 'none', 'builder-vocabulary': vocabulary,
-        'builder-detected-features': 60, 'lcd-min-gap-s': 0.1, 'lcd-map-window': 0,
-        'label-rule': 'distance', 'label-min-gap-s': 0.1}
-
-    def run(*more):
-        options = [text for name, value in settings.items() for text in (f'--{name}', str(value))]
-        return main(['targets', str(tmp_path / 'walk'), *options, *more])
-    return run
+    return command_on_a_walk('targets', tmp_path, vocabulary, monkeypatch, nodes=20, pairs=5,
+                             draws=2)
 
 
 def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):

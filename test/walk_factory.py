@@ -3,9 +3,13 @@
 
 """A short walk and back in pictures, with settings under which its graphs are attacked at once."""
 
+from contextlib import contextmanager
+
 import bag_factory as make
 
+from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.evaluation import workers
 
 NODES = 20
 PLACES = 6
@@ -36,6 +40,26 @@ def walk_folder(path):
     (path / 'groundtruth.txt').write_text('# timestamp tx ty tz qx qy qz qw\n' + '\n'.join(
         make.pose_line(stamp, 3.0 * (number % PLACES)) for number, stamp in enumerate(stamps)))
     return path
+
+
+def command_on_a_walk(name, folder, vocabulary, monkeypatch, **settings):
+    """Return a function that runs a command on a short walk in a folder, in this process."""
+    @contextmanager
+    def one_process(jobs):
+        yield map
+    monkeypatch.setattr(workers, 'local_workers', one_process)
+    walk_folder(folder / 'walk')
+    settings = {
+        'cache': folder / 'cache', 'output': folder / 'out', **settings,
+        'builder-detector': 'none', 'builder-vocabulary': vocabulary,
+        'builder-detected-features': 60, 'lcd-min-gap-s': 0.1, 'lcd-map-window': 0,
+        'label-rule': 'distance', 'label-min-gap-s': 0.1}
+
+    def run(*more):
+        options = [text for option, value in settings.items()
+                   for text in (f'--{option}', str(value))]
+        return main([name, str(folder / 'walk'), *options, *more])
+    return run
 
 
 def builder_config(vocabulary):

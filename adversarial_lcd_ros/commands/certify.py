@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import replace
-import os
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -16,6 +15,8 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    add_work_options,
+    check_counts,
     print_json,
     progress_bar,
 )
@@ -56,12 +57,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--frames', type=int, default=60, metavar='N',
                         help='most loops and most new places of a sequence, spread over it '
                         '(default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes (default: one for each core)')
-    parser.add_argument('--cache', type=Path, metavar='FOLDER',
-                        help='where built graphs are kept (default: in the cache of the user)')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+    add_work_options(parser)
     add_json_option(parser)
     add_models_option(parser)
     for config, prefix in ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'),
@@ -107,9 +103,7 @@ def _tasks(options: Namespace) -> list[CertificateTask]:
     from adversarial_lcd_ros.evaluation.streams import open_streams
     from adversarial_lcd_ros.lcd.certificates import check_provable
 
-    for name in ('budget', 'frames', 'jobs'):
-        if getattr(options, name) < 1:
-            raise ConfigError(f'--{name} {getattr(options, name)}: expected 1 or more')
+    check_counts(options, 'budget', 'frames', 'jobs')
     for name, instead in (('target', 'targets'), ('defences', 'defences')):
         if name in chosen_settings(options, LcdConfig):
             raise ConfigError(f'setting {name} of the detector: here --{instead} says which, one '

@@ -13,6 +13,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
@@ -108,6 +109,24 @@ def make_console(*, stderr: bool = False) -> Console:
     known = stream.isatty() or 'COLUMNS' in os.environ
     return Console(width=None if known else TABLE_WIDTH, stderr=stderr, markup=False,
                    emoji=False, highlight=False)
+
+
+def add_work_options(parser: ArgumentParser) -> None:
+    """Add how many processes work, where built graphs are kept, and a file of settings."""
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='processes (default: one for each core)')
+    parser.add_argument('--cache', type=Path, metavar='FOLDER',
+                        help='where built graphs are kept (default: in the cache of the user)')
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help='settings (YAML); options of the command line win over it')
+
+
+def check_counts(options: Namespace, *names: str) -> None:
+    """Raise ConfigError unless each of these options that is given is 1 or more."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise ConfigError(f'--{name} {value}: expected 1 or more')
 
 
 def add_source_options(parser: ArgumentParser) -> None:

@@ -16,6 +16,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros.commands.common import (
+    check_counts,
     make_console,
     print_json,
     print_lines,
@@ -154,10 +155,7 @@ def _check(options: Namespace) -> None:
     if chosen_settings(options, ReplayConfig):
         raise ConfigError('settings of the replay are given, but nothing is replayed: name a '
                           'part of a sequence as PATH@FROM:TO')
-    for name in ('jobs', 'seeds'):
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            raise ConfigError(f'--{name} {value}: expected 1 or more')
+    check_counts(options, 'jobs', 'seeds')
     if options.jobs is not None and options.scheduler is not None:
         raise ConfigError('--jobs and --scheduler: expected one of them; the cluster has its own '
                           'number of workers')

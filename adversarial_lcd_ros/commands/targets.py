@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import asdict
-import os
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -17,6 +16,8 @@ from adversarial_lcd_ros.commands.common import (
     add_command,
     add_json_option,
     add_source_options,
+    add_work_options,
+    check_counts,
     imported_source,
     print_json,
     progress_bar,
@@ -66,12 +67,7 @@ def add(commands: Commands) -> None:
                         help='draws of pairs, each with a seed of its own (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=401, metavar='N',
                         help='of the first draw (default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes (default: one for each core)')
-    parser.add_argument('--cache', type=Path, metavar='FOLDER',
-                        help='where built graphs are kept (default: in the cache of the user)')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+    add_work_options(parser)
     add_json_option(parser)
     add_source_options(parser)
     add_models_option(parser)
@@ -87,9 +83,7 @@ def _run(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.workers import local_workers
     from adversarial_lcd_ros.files.writing import write_text
 
-    for name in ('pairs', 'draws', 'jobs'):
-        if getattr(options, name) < 1:
-            raise ConfigError(f'--{name} {getattr(options, name)}: expected 1 or more')
+    check_counts(options, 'pairs', 'draws', 'jobs')
     sequences = _sequences(options)
     with open_store(options.output) as store:
         tasks = _tasks(options, sequences)

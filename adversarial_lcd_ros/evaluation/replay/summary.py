@@ -134,16 +134,17 @@ def _behind_check(attacks: Mapping[str, AttackConfig | None], clean: Sequence[Qu
     if not any(record.support is not None for record in clean):
         return None
     before = behind_check(clean)
-    rows = [{'name': name, **_decline(before, behind_check(run), block, seed)}
-            for name, run in runs.items()]
+    behind = {name: behind_check(run) for name, run in runs.items()}
+    rows = [{'name': name, **run_metrics(run).as_dict(), **_lost(before, run, block, seed)}
+            for name, run in behind.items()]
     return {'clean': run_metrics(before).as_dict(), 'attacks': rows}
 
 
-def _decline(clean: Sequence[QueryRecord], run: Sequence[QueryRecord], block: int,
-             seed: int) -> dict[str, Any]:
+def _lost(clean: Sequence[QueryRecord], run: Sequence[QueryRecord], block: int,
+          seed: int) -> dict[str, Any]:
     """Return what a run lost against the clean one."""
     kind, before, after = column(clean, 'label'), column(clean, 'outcome'), column(run, 'outcome')
-    return {**run_metrics(run).as_dict(), **asdict(effect(kind, before, after)),
+    return {**asdict(effect(kind, before, after)),
             'decline_ci95': intervals.decline_interval(
                 told_kind(kind, before, after), right(before), right(after), block, seed)}
 
@@ -212,9 +213,6 @@ def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str,
 
 def _attack_figures(name: str, config: AttackConfig | None, clean: Sequence[QueryRecord],
                     run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
-    kind = column(clean, 'label')
-    before, after = column(clean, 'outcome'), column(run, 'outcome')
-    change = asdict(effect(kind, before, after))
     # Of an attack that was only recorded nobody knows the settings.
     known = attack_columns(config or AttackConfig())
     settings = {**known, **{shown: getattr(config or AttackConfig(), field) for shown, field in (
@@ -223,11 +221,10 @@ def _attack_figures(name: str, config: AttackConfig | None, clean: Sequence[Quer
         settings = dict.fromkeys(settings)
     return {
         'name': name, **settings, 'decisions': len(run), **_effort(run),
-        **_run_figures(run, block, seed), **change, **_changes(clean, run),
+        **_run_figures(run, block, seed), **_lost(clean, run, block, seed),
+        **_changes(clean, run),
         **{f'{what}_elsewhere': sum(record.effect == what and record.match_is == ELSEWHERE
-                                    for record in run) for what in ('invented', 'diverted')},
-        'decline_ci95': intervals.decline_interval(
-            told_kind(kind, before, after), right(before), right(after), block, seed)}
+                                    for record in run) for what in ('invented', 'diverted')}}
 
 
 def _changes(clean: Sequence[QueryRecord], run: Sequence[QueryRecord]) -> dict[str, Any]:
