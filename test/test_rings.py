@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from results_factory import ring_row
 
-from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
@@ -22,10 +22,15 @@ from adversarial_lcd_ros.evaluation.recipes import read_recipe
 from adversarial_lcd_ros.evaluation.rings import report
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
+    PairTask,
     PosterConfig,
     conditions_of,
     counts,
     poster_config,
+    poster_streams,
+    poster_tasks,
+    run_pair,
+    scene_of,
 )
 from adversarial_lcd_ros.evaluation.rings.report import write_rings
 from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME, Condition, Scene
@@ -39,6 +44,11 @@ from adversarial_lcd_ros.evaluation.rings.summaries import (
     worst_cases,
 )
 from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
+from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
+from adversarial_lcd_ros.graph_sequences.opening import open_graphs
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.paths import share_path
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 CAMERA = Camera(np.eye(3), np.zeros(3), 0.785, 640, 480)
 
@@ -254,3 +264,57 @@ def test_a_folder_of_rings_is_read_reported_and_compared(tmp_path):
     (tmp_path / 'summary.json').write_text(json.dumps({**summary, 'worst': 3}))
     with pytest.raises(EvaluationError, match='damaged'):
         open_results(tmp_path)
+
+
+def test_each_detector_gets_posted_graphs_of_the_variant_it_needs(tmp_path):
+    source = f'{share_path("bags/flat_tour")}@0:0.12'
+    small = {'detector': 'none', 'features': 150}
+    stored = {variant: open_graphs(source, BuilderConfig(graph_variant=variant, **small),
+                                   tmp_path).graphs for variant in ('tiers', 'anchors')}
+    tiers = BuilderConfig(**small)
+    # The stream of another target's graphs does as well.
+    for variant, graphs in stored.items():
+        task = PairTask(
+            'tour', GraphSource(source, replace(tiers, graph_variant=variant), tmp_path,
+                                graphs_digest(graphs)), tiers, 5, 40, np.ones(43, bool),
+            (Condition('cells', 0.3), Condition('none', 0.0, 0, BARE)), ('wl', 'symbio'),
+            (('check', LcdConfig(defences='geometric_check')),), LcdConfig(min_gap_s=2.0),
+            0.82, 42)
+        rows = run_pair(task)
+        assert [(row['kind'], row['target'], row['check']) for row in rows] == [
+            (kind, target, check) for kind in ('cells', 'none') for target in ('wl', 'symbio')
+            for check in ('none', 'check')]
+        posted, _ = scene_of(task, graphs).posted(task.conditions[0])
+        for target, made in (('wl', 'tiers'), ('symbio', 'anchors')):
+            clean = stored[made]
+            with GraphBuilder(BuilderConfig(graph_variant=made, **small)) as builder:
+                built = {index: builder.build(image, clean[index].stamp_ns)
+                         for index, image in posted.items()}
+            detector = LoopClosureDetector(LcdConfig(target=target, min_gap_s=2.0))
+            for index in range(40):
+                detector.remember(built.get(index, clean[index]))
+            decision = detector.judge(built[40])
+            row = next(row for row in rows if row['target'] == target)
+            assert row['declared'] == decision.is_loop
+            assert row['to_poster'] == (decision.is_loop and decision.match_stamp_ns in {
+                clean[index].stamp_ns for index in (4, 5, 6)})
+        assert any(row['to_poster'] for row in rows if row['target'] == 'symbio')
+
+
+def some_stream(name, nodes, variant=''):
+    labels = SimpleNamespace(kind=np.zeros(30), elsewhere=np.ones((30, 30), bool),
+                             candidates=np.arange(30))
+    builder = BuilderConfig(graph_variant=variant or 'tiers')
+    return SimpleNamespace(name=name, nodes=nodes, variant=variant, labels=labels,
+                           graphs=GraphSource(name, builder, None, ''))
+
+
+def test_posters_hang_once_in_each_sequence_in_graphs_for_any_target():
+    tour, small, anchored = (some_stream('tour', 300), some_stream('tour', 100),
+                             some_stream('tour', 300, 'anchors'))
+    other = some_stream('other', 300, 'anchors')
+    assert poster_streams([small, tour, anchored, other]) == [tour, other]
+    for stream in (tour, other):
+        tasks = poster_tasks(stream, PosterConfig(pairs=2), LcdConfig(), (), LabelConfig())
+        assert [(task.graphs, task.builder) for task in tasks] == [
+            (stream.graphs, BuilderConfig())] * 2

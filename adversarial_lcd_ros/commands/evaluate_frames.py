@@ -125,7 +125,12 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     """Hang the posters of a recipe, measure what defences cost, write the page."""
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.rings.pictures import ring_pictures
-    from adversarial_lcd_ros.evaluation.rings.posters import PairTask, poster_config, poster_tasks
+    from adversarial_lcd_ros.evaluation.rings.posters import (
+        PairTask,
+        poster_config,
+        poster_streams,
+        poster_tasks,
+    )
     from adversarial_lcd_ros.evaluation.rings.report import (
         measured_prices,
         run_posters,
@@ -138,10 +143,11 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     tasks: list[PairTask] = []
     if posters[1] is not None:
         config, checks = poster_config(posters[1], posters[0])
+        hung = poster_streams(streams)
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared = run_posters(folder, streams, config, checks, lcd, labels, workers,
+            declared = run_posters(folder, hung, config, checks, lcd, labels, workers,
                                    progress)
-        tasks = [task for stream in streams
+        tasks = [task for stream in hung
                  for task in poster_tasks(stream, config, lcd, checks, labels)]
     write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
