@@ -549,6 +549,9 @@ class BagReplayNodeConfig(Config):
         'empty: none.')
     record_frames: bool = setting(
         True, 'Record what is replayed, too: camera frames, poses, detections.')
+    key: str = setting(
+        '', 'Lockstep: file of the key of lcd, where it has one; frames whose graph lcd refuses '
+        'for its seal are not waited for. Empty: every frame is.')
 
 
 @dataclass(frozen=True)
