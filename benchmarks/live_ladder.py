@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
+import shlex
 import shutil
 import signal
 import sys
@@ -51,7 +52,7 @@ from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 NONE, POSTER, KEY = 'none', 'poster', 'key'
 # The paper's search would ask 1080 times; what is held here is that live and offline are one.
-QUERIES = 40
+QUERIES = 24
 PASS = AttackConfig(mode='pass')
 ATTACKS = {
     NONE: PASS,
@@ -180,7 +181,7 @@ def page(bag: Path, built: Sequence[dict[str, Any]], rows: Sequence[dict[str, An
          spent_s: float) -> Iterator[str]:
     """Yield the lines of the page."""
     differ = sum(row[name] for row in rows for name in row if name.endswith('_differ'))
-    yield f'Made by `python benchmarks/live_ladder.py {" ".join(sys.argv[1:])}`'.rstrip() + '.'
+    yield f'Made by `{shlex.join(("python", "benchmarks/live_ladder.py", *sys.argv[1:]))}`.'
     yield '\n# Attackers beside defences, live over the nodes\n'
     yield (f'{bag.name}, {rows[0]["frames"]} frames, {len(rows)} runs over the nodes, each a '
            'process, in lockstep; a map of what the detector was sent. '
