@@ -26,11 +26,12 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import Ask
-from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
 from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
+from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import (
     ELSEWHERE,
@@ -87,6 +88,11 @@ class FrameResult:
     clean_is, attacked_is : str
         What is said of the match named, declared or not: ``FrameLabels.judge``.
     result : AttackResult
+    unexplained_clean, unexplained : int or None
+        Edges of the clean graph, and of the one that arrived, that defences have no explanation
+        for; None if none of them counts, or no graph arrived.
+    refused : str
+        Why the detector took no graph on this frame, and decided nothing; empty if it did.
     query_s, search_s, judge_s : float
         Processor time spent in the asked detector, in the rest of the attack, and on judging
         its outcome: what else the machine does is no matter.
@@ -102,6 +108,9 @@ class FrameResult:
     query_s: float
     search_s: float
     judge_s: float
+    unexplained_clean: int | None = None
+    unexplained: int | None = None
+    refused: str = ''
 
 
 class _Adversary(Protocol):
@@ -118,6 +127,16 @@ class _Yardstick:
 
     def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
         return self.optimum.process(graph)
+
+    def observe(self, graph: MultiTierGraph) -> None:
+        """Remember nothing."""
+
+
+class _Resigned:
+    """Knows that graphs are sealed, and sends them as they are."""
+
+    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
+        return AttackResult(graph, graph, 'skipped', 'what is changed would be refused')
 
     def observe(self, graph: MultiTierGraph) -> None:
         """Remember nothing."""
@@ -141,11 +160,12 @@ class _Timed:
 
 @dataclass
 class _Contest:
-    """A cell's attacker, and the detectors that it asks and that judge it."""
+    """A cell's attacker, the detectors that it asks and that judge it, and what is between."""
 
     adversary: _Adversary
     asked: LoopClosureDetector
     judging: LoopClosureDetector
+    wire: SealedWire | None = None
     results: list[FrameResult] = field(default_factory=list)
 
 
@@ -235,6 +255,9 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     detectors: dict[LcdConfig, LoopClosureDetector] = {}
     kind_of_detector = LoopClosureDetector if sample.reference is None else PairDetector
     contests = [_contest(cell, lcd, seed, detectors, kind_of_detector) for cell in cells]
+    wire = SealedWire() if any(cell.sealed for cell in cells) else None
+    for cell, contest in zip(cells, contests, strict=True):
+        contest.wire = wire if cell.sealed else None
     place = {int(frame): row for row, frame in enumerate(sample.frame)}
     index_of = {graph.stamp_ns: index for index, graph in enumerate(graphs)}
     for index, graph in enumerate(graphs[:max(place, default=-1) + 1]):
@@ -247,6 +270,8 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
                 contest.results.append(_attack_frame(
                     contest, graph, clean[contest.judging.config], int(sample.kind[row]),
                     sample.match_is[row], index_of))
+        if wire is not None:
+            wire.carry(graph)
         for detector in detectors.values():
             detector.remember(graph)
         for contest in contests:
@@ -273,9 +298,16 @@ def _contest(cell: Cell, lcd: LcdConfig, seed: int,
             detectors[config] = make(config)
     judging, asked = (detectors[config] for config in configs)
     attack = replace(cell.attack, seed=seed)
-    adversary: _Adversary = (_Yardstick(Optimum(judging if cell.aware else asked, attack))
-                             if cell.search == Optimum.name else Attacker(attack))
-    return _Contest(adversary, asked, judging)
+    return _Contest(_adversary(cell, attack, judging, asked), asked, judging)
+
+
+def _adversary(cell: Cell, attack: AttackConfig, judging: LoopClosureDetector,
+               asked: LoopClosureDetector) -> _Adversary:
+    if cell.sealed and cell.aware:
+        return _Resigned()
+    if cell.search == Optimum.name:
+        return _Yardstick(Optimum(judging if cell.aware else asked, attack))
+    return Attacker(attack)
 
 
 def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, kind: int,
@@ -284,12 +316,32 @@ def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, 
     begun = time.thread_time()
     result = contest.adversary.attack(graph, ask)
     attacked = time.thread_time()
-    after = contest.judging.judge(result.perturbed)
+    arrived, refused = _arrived(contest, result)
+    after = _undecided(graph) if arrived is None else contest.judging.judge(arrived)
+    judged = time.thread_time()
     _check_budgets(result, ask.count)
     return FrameResult(
         kind, clean, after, _said_of(clean, match_is, index_of),
         _said_of(after, match_is, index_of), result, ask.spent_s,
-        attacked - begun - ask.spent_s, time.thread_time() - attacked)
+        attacked - begun - ask.spent_s, judged - attacked,
+        _unexplained(contest, graph), _unexplained(contest, arrived), refused)
+
+
+def _arrived(contest: _Contest, result: AttackResult) -> tuple[MultiTierGraph | None, str]:
+    """Return what the detector gets of an attacked graph, or why it refuses it."""
+    if contest.wire is None:
+        return result.perturbed, ''
+    return contest.wire.arrives(result.clean, result.perturbed)
+
+
+def _undecided(graph: MultiTierGraph) -> LoopClosure:
+    return LoopClosure(graph.stamp_ns, graph.frame_id, graph.sequence, is_loop=False,
+                       probability=0.0)
+
+
+def _unexplained(contest: _Contest, graph: MultiTierGraph | None) -> int | None:
+    scoring = contest.judging.judging.scoring
+    return scoring.unexplained(graph) if graph is not None and scoring.counts_edges else None
 
 
 def _said_of(decision: LoopClosure, match_is: NDArray[np.str_], index_of: dict[int, int]) -> str:
