@@ -16,12 +16,9 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames import attacked as frames
-from adversarial_lcd_ros.evaluation.frames.attacked import (
-    FrameSample,
-    attack_frames,
-    sample_frames,
-)
+from adversarial_lcd_ros.evaluation.frames.attacked import attack_frames
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.samples import FrameSample, sample_frames
 from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
 from adversarial_lcd_ros.lcd.defences.rederive import RederiveCheck
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector

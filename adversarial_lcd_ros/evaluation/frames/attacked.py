@@ -16,7 +16,7 @@ The sample hangs on seed and sequence only: all attacks meet the same frames.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 import time
 from typing import Protocol
@@ -30,48 +30,12 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
-from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
+from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector
+from adversarial_lcd_ros.evaluation.frames.samples import FrameSample
 from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.ground_truth.labels import (
-    ELSEWHERE,
-    NEGATIVE,
-    POSITIVE,
-    RIGHT,
-    UNTOLD,
-    FrameLabels,
-)
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery, LoopClosure
-
-_DRAW = 20_210  # of the one drawing that all seeds share
-
-
-@dataclass(frozen=True, eq=False)
-class FrameSample:
-    """
-    The frames to attack, and what ground truth says about them.
-
-    Attributes
-    ----------
-    frame : int64, (k,)
-        Indices in the stream, ascending.
-    kind : int8, (k,)
-        +1 a loop is there to be found, -1 a new place.
-    match_is : str, (k, n)
-        What is said of a match with each frame of the stream: ``FrameLabels.judge``.
-    told_by : str
-        What told the labels, ``FrameLabels.told_by``.
-    reference : int64, (k,), optional
-        By pairs: the earlier frame that each is held against. None: it is held against the map.
-
-    """
-
-    frame: NDArray[np.int64]
-    kind: NDArray[np.int8]
-    match_is: NDArray[np.str_]
-    told_by: str = ''
-    reference: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
@@ -167,63 +131,6 @@ class _Contest:
     judging: LoopClosureDetector
     wire: SealedWire | None = None
     results: list[FrameResult] = field(default_factory=list)
-
-
-def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
-    """
-    Draw frames with a loop, and as many at new places.
-
-    The frames of each kind are cut in time into ``per_kind`` parts, and one of each part is
-    drawn. Seeds that follow each other draw different frames, until a part is used up and begins
-    anew: then its frames are attacked again, with other random numbers. A kind with fewer frames
-    than asked for gives all it has, and one without any gives none.
-
-    Parameters
-    ----------
-    labels : FrameLabels
-        Of the stream.
-    per_kind : int
-        Frames of each kind.
-    seed : int
-        Of the cell.
-
-    """
-    chosen = []
-    for kind in (POSITIVE, NEGATIVE):
-        frames = np.flatnonzero(labels.kind == kind)
-        for part in np.array_split(frames, min(per_kind, len(frames)) or 1):
-            if len(part):
-                order = np.random.default_rng((_DRAW, int(part[0]))).permutation(part)
-                chosen.append(int(order[seed % len(part)]))
-    frame = np.array(sorted(chosen), np.int64)
-    every = np.arange(len(labels.kind))
-    match_is = np.array([labels.judge(np.full(len(every), query), every) for query in frame],
-                        np.str_).reshape(len(frame), len(every))
-    return FrameSample(frame, labels.kind[frame], match_is, labels.told_by)
-
-
-def sample_pairs(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
-    """
-    Draw loops, and as many pairs of different places (``pairs.draw_pairs``).
-
-    Parameters
-    ----------
-    labels : FrameLabels
-        Of the stream.
-    per_kind : int
-        Pairs of each kind.
-    seed : int
-        Of the cell.
-
-    """
-    query, kind, reference = draw_pairs(labels.relation, per_kind, seed)
-    match_is = np.full((len(query), len(labels.kind)), UNTOLD, f'<U{len(ELSEWHERE)}')
-    match_is[np.arange(len(query)), reference] = np.where(kind == POSITIVE, RIGHT, ELSEWHERE)
-    return FrameSample(query, kind, match_is, labels.told_by, reference)
-
-
-SAMPLES: Mapping[str, Callable[[FrameLabels, int, int], FrameSample]] = {
-    'frames': sample_frames, 'pairs': sample_pairs}
 
 
 def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],

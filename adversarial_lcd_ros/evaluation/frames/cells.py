@@ -33,7 +33,7 @@ SCHEMA = 7
 _CODE = ('attack', 'lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled',
          'messages', 'evaluation/metrics', 'evaluation/frames/attacked',
          'evaluation/frames/optimum', 'evaluation/frames/pairs', 'evaluation/frames/rows',
-         'evaluation/frames/sealed')
+         'evaluation/frames/samples', 'evaluation/frames/sealed')
 ORACLES = ('soft', 'hard')
 JUDGED = ('frames', 'pairs')
 SEALED = 'sealed graphs'
