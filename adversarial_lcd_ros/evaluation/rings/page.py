@@ -21,10 +21,11 @@ left alone; in brackets those that certainly name another place. The optimum is 
 looks into the detector. Unexplained: edges that a defence cannot explain by the nodes, mean of
 clean and of attacked graphs, where the detector counts them."""
 _SEALED = """\
-Sealed graphs: builder and detector share a key. Who knows of it sends graphs as they are, or holds
-them back. What others send is refused, counted by cause, and decides nothing: new places are left
-alone, **and loops are lost**. Cutting the wire loses them as well; here each refusal is an alarm,
-and a graph that was held back shows as missing."""
+Sealed graphs: builder and detector share a key. Who knows of it sends graphs as they are: nothing
+is lost. What others send is refused, counted by cause, and decides nothing: new places are left
+alone, **and loops are lost**, with an alarm for each. Cutting the wire, or holding graphs back,
+loses them as well and is measured nowhere on this page, since nothing stops it; graphs that were
+held back are counted as missing."""
 _WORST = """\
 Worst case as RobustBench counts it: a frame is held only if every attack of the column, and of
 those left of it, fails on it, so each figure is below that of any single attack. A graph that is
