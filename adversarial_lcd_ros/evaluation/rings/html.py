@@ -13,6 +13,7 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.page import data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import CONFIGURATION, ENVIRONMENT, read_json
+from adversarial_lcd_ros.evaluation.rings.page import SEALED, refused, unexplained
 from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
 from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS
 from adversarial_lcd_ros.evaluation.rings.tables import (
@@ -37,7 +38,9 @@ def rings_html(folder: Path, summary: Mapping[str, Any]) -> str:
     """
     ranks = ranking(summary)
     page: str = load_template('rings.html.j2').render(
-        headline=headline(ranks), ranks=ranks, levels=LEVELS, matrices=matrices(summary['rows']),
+        headline=headline(ranks), ranks=ranks, unexplained=unexplained, refused=refused,
+        sealed=(SEALED.replace('**', '') if any(row.get('sealed') for row in summary['rows'])
+                else ''), levels=LEVELS, matrices=matrices(summary['rows']),
         posters=poster_table(summary['posters']) if summary['posters'] else None,
         sequences=list(dict.fromkeys(row['sequence'] for row in summary['rows'])),
         curves=data_uri(ring_curves(summary), 'svg+xml'),

@@ -118,14 +118,18 @@ def matrices(rows: Sequence[Summary]) -> list[Matrix]:
 
 def standings(summary: Mapping[str, Any]) -> list[Standing]:
     """Return what is left of every detector with every defence, from summary.json's content."""
-    price = {(entry['sequence'], entry['defence']): entry['more_us']
+    if not summary['rows']:
+        return []
+    # Of one target, where it is not said.
+    target = summary['rows'][0]['target']
+    price = {(entry['sequence'], entry.get('target', target), entry['defence']): entry['more_us']
              for entry in summary['prices']}
     clean = {(row['sequence'], row['target'], row['defence']): row['balanced_clean']
              for row in summary['rows']}
     left = {(entry['sequence'], entry['target'], entry['defence'], entry['level']): entry
             for entry in summary['worst']}
     return [Standing(*key, value, tuple(left.get((*key, level)) for level in LEVELS),
-                     price.get((key[0], key[2]))) for key, value in clean.items()]
+                     price.get(key)) for key, value in clean.items()]
 
 
 def ranking(summary: Mapping[str, Any]) -> list[Rank]:
