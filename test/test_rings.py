@@ -46,7 +46,7 @@ from adversarial_lcd_ros.evaluation.rings.summaries import (
     summarise,
     worst_cases,
 )
-from adversarial_lcd_ros.evaluation.rings.tables import standings
+from adversarial_lcd_ros.evaluation.rings.tables import ranking, standings
 from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
 from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
@@ -220,7 +220,8 @@ def test_the_page_is_of_the_summary_alone(tmp_path):
 
 
 def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
-    rows = [*ROWS, *SEALED, ring_row('', 'recall', 'recall', [LOST, LEFT], target='symbio')]
+    rows = [*ROWS, *SEALED, ring_row('', 'replay', 'replay', [LOST, LOST, MADE, MADE]),
+            ring_row('', 'recall', 'recall', [LOST, LEFT], target='symbio')]
     prices = [{'sequence': 'tour', 'target': target, 'defence': 'none', 'decision_us': 9.0,
                'more_us': more} for target, more in (('wl', 0.0), ('symbio', 7.0))]
     text = write_rings(tmp_path, rows, [], prices).read_text().replace('\u202f', ' ')
@@ -242,6 +243,9 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     report = rings_html(tmp_path, summary).replace('\u202f', ' ')
     assert ', refused: age 1, replayed 1</small>' in report
     assert ', or refused 100 %' in report
+    assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [
+        'sealed graphs', 'rederive', 'none']
+    assert 'or 100.0 % where a refusal counts as an attack that failed' in report
     assert 'Sealed graphs: builder and detector share a key.' in report
     # A folder from before there were seals and counts.
     old = tmp_path / 'old'
