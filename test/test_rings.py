@@ -21,7 +21,7 @@ from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
 from adversarial_lcd_ros.evaluation.rings import plots, report
-from adversarial_lcd_ros.evaluation.rings.html import rings_html
+from adversarial_lcd_ros.evaluation.rings.html import headline, rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
     PairTask,
@@ -251,6 +251,25 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     old = tmp_path / 'old'
     old.mkdir()
     assert 'Sealed graphs' not in write_rings(old, ROWS, [], []).read_text()
+
+
+def test_defences_are_ranked_by_what_is_left_over_all_sequences():
+    def summary(held):
+        rows = [{'sequence': sequence, 'target': 'wl', 'defence': defence, 'balanced_clean': 1.0}
+                for sequence in 'ab' for defence in ('none', 'x', 'half')]
+        return {'rows': rows, 'prices': [], 'worst': [
+            {'sequence': sequence, 'target': 'wl', 'defence': defence, 'level': WITHIN_R,
+             'balanced': value, 'attacks': 2} for (sequence, defence), value in held.items()]}
+    ranks = ranking(summary({('a', 'none'): .2, ('b', 'none'): .4, ('a', 'x'): .9,
+                             ('b', 'x'): .5, ('a', 'half'): 1.0}))
+    # Of "half" nothing is known on b: it cannot be first.
+    assert [(rank.defence, rank.held[0]) for rank in ranks] == [
+        ('x', pytest.approx(.7)), ('none', pytest.approx(.3)), ('half', None)]
+    said = headline(ranks)
+    assert 'leaves 30.0' in said
+    assert 'behind x, 70.0' in said
+    assert 'no defence that was tried leaves more' in headline(ranking(summary({
+        (sequence, defence): .5 for sequence in 'ab' for defence in ('none', 'x')})))
 
 
 def test_the_same_nodes_close_and_far_apart_are_two_curves():
