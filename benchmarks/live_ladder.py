@@ -70,6 +70,7 @@ DEFENCES = {
     NONE: LcdConfig(),
     'rederive': LcdConfig(defences='rederive'),
     'rederive_check': LcdConfig(defences='rederive_check'),
+    'nearest_check': LcdConfig(defences='nearest_check'),
     'length_check': LcdConfig(defences='length_check'),
     'geometric_check': LcdConfig(defences='geometric_check'),
     'geometric_check, hull': LcdConfig(defences='geometric_check', geometric_hull=0.1),

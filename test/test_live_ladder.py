@@ -43,9 +43,10 @@ ATTACKS = {
     'replay': AttackConfig(search='replay')}
 # Every attacker once, every defence once, before one who changes what the detector is sent.
 PAIRS = [
-    ('paper', {}), ('nearest', {}), ('replay', {}),
+    ('paper', {}), ('replay', {}),
     ('recall, no queries', {'defences': 'rederive'}),
     ('recall', {'defences': 'rederive_check'}),
+    ('nearest', {'defences': 'nearest_check'}),
     ('lengths', {'defences': 'length_check'}),
     ('nodes', {'defences': 'geometric_check'}),
     ('nodes far apart', {'defences': 'geometric_check', 'geometric_hull': 0.1}),
