@@ -159,7 +159,7 @@ def _plan(options: Namespace) -> Plan:
     if options.map:
         maps.check(options)
 
-    from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
+    from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan
     from adversarial_lcd_ros.lcd.targets import builder_for
 
@@ -169,7 +169,8 @@ def _plan(options: Namespace) -> Plan:
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
-                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
+                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels,
+                posters=load_posters(options.recipe))
 
 
 def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
