@@ -190,7 +190,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
     from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
-    made = maps.make(folder, options) if options.map else None
+    made = maps.make([folder], options) if options.map else None
     if options.json:
         print_json({'folder': str(folder), **as_document(summary),
                     **({} if made is None else {'map': made})})
