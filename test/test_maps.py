@@ -4,7 +4,9 @@
 """Maps of a made-up replay, from its results folder to tables, report and g2o."""
 
 from dataclasses import replace
+import importlib.util
 import json
+from pathlib import Path
 import sys
 
 import bag_factory as make
@@ -22,6 +24,7 @@ from adversarial_lcd_ros.evaluation import results
 from adversarial_lcd_ros.evaluation.maps.beside import read_beside
 from adversarial_lcd_ros.evaluation.maps.claims import claim_errors
 from adversarial_lcd_ros.evaluation.maps.inputs import has_metres, read_inputs
+from adversarial_lcd_ros.evaluation.maps.overview import overview
 from adversarial_lcd_ros.evaluation.maps.plan import ADDED, MISSING, pairs_of, plan_cases
 from adversarial_lcd_ros.evaluation.maps.run import make_maps
 from adversarial_lcd_ros.evaluation.maps.summary import summarise_cases
@@ -34,6 +37,7 @@ from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.slam.motions import between
 
+ROOT = Path(__file__).resolve().parents[1]
 COUNT, LAP = 60, 30
 FIRST = 29  # is back near the start of the path
 LABELS = LabelConfig(rule='distance', min_gap_s=0.1, positive_distance_m=0.3,
@@ -278,6 +282,50 @@ def test_several_replays_make_one_table_each_against_its_own_clean_run(beside, t
     assert 'Under forger, vbow' in page
     assert main(['inspect', str(out)]) == 0
     assert main(['compare', str(out), str(out)]) == 0
+
+
+def test_an_overview_takes_the_worst_of_each_back_end_and_marks_what_is_worse_than_none():
+    def row(run, back_end, error, setting='', stage='whole', **more):
+        return {'run': run, 'setting': setting, 'stage': stage, 'back_end': back_end,
+                'ate_m': error, 'false': 3 if run == 'a' else 0, 'checked': False, 'drift': 1.0,
+                'added': None, 'missing': None, 'claims': '', **more}
+
+    rows = [row(run, back_end, error) for run, errors in (
+        ('clean', (0.2, 0.1, 0.1)), ('a', (0.2, 1.5, 0.2001)), ('b', (0.2, 0.9, 0.3)))
+        for back_end, error in zip(('odometry', 'least_squares', 'gnc'), errors, strict=True)]
+    rows += [row('a', 'least_squares', 9.0, drift=3.0), row('a', 'least_squares', 9.0, added=3),
+             row('a', 'gnc', 0.1, 'length check'), row('a', 'odometry', 0.2, 'length check')]
+    _, cells = overview({'tour': {'rows': rows}})
+    found = [(each['run'], each['false closures'], each['least squares'], each['GNC'])
+             for each in cells]
+    assert found == [('clean', 'n/a / 0', 'n/a / 0.100', 'n/a / 0.100'),
+                     ('worst attack', 'n/a / 3', 'n/a / **1.500**', 'n/a / **0.300**'),
+                     ('worst attack, length check', 'n/a / 3', 'n/a / n/a', 'n/a / 0.100')]
+
+
+def test_a_page_has_the_tables_of_every_sequence(tmp_path, monkeypatch):
+    from results_factory import map_folder
+
+    spec = importlib.util.spec_from_file_location('map_page', ROOT / 'benchmarks/map_page.py')
+    map_page = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(map_page)
+    page = tmp_path / 'map.md'
+    page.write_text(f'Kept.\n\n{map_page.BEGIN}\nold\n{map_page.END}\n\nKept, too.\n')
+    monkeypatch.setattr(map_page, 'PAGE', page)
+    folders = [str(map_folder(tmp_path / name)) for name in ('one', 'two')]
+    map_page.main(folders)
+    map_page.main(folders)
+    text = page.read_text()
+    assert text.startswith('Kept.\n')
+    assert text.endswith('Kept, too.\n')
+    assert 'old' not in text
+    assert [line for line in text.splitlines() if line.startswith('## ')] == [
+        '## All sequences', '## one', '## two']
+    assert '### two: absolute error in metres, whole run' in text
+    assert text.count('<details>') == text.count('</details>') == 2
+    page.write_text('no place')
+    with pytest.raises(SystemExit, match='no lines'):
+        map_page.main(folders[:1])
 
 
 @needs_gtsam

@@ -108,7 +108,8 @@ def _stage(folder: Path, summary: Mapping[str, Any], stage: str) -> dict[str, An
     time_s = np.arange(shown[0].case['frames'], dtype=np.float64) * summary['period_s']
     return {'title': stage_title(shown[0].case), 'legend': [(one.title, one.colour)
                                                             for one in shown],
-            'paths': _uri(plots.draw_paths(shown)),
+            'paths_wide': _uri(plots.draw_paths(shown)),
+            'paths_narrow': _uri(plots.draw_paths(shown, NARROW)),
             'errors_wide': _uri(plots.draw_errors(shown, time_s, WIDE)),
             'errors_narrow': _uri(plots.draw_errors(shown, time_s, NARROW))}
 

@@ -91,7 +91,8 @@ def is_main(row: Mapping[str, Any]) -> bool:
 def all_tables(summary: Mapping[str, Any]) -> list[Table]:
     """Return the tables of a summary: runs by stage, what was kept, claims, then the sweeps."""
     rows = summary['rows']
-    return [*run_tables(summary), *_kept(rows), *claim_tables(summary), *_sweeps(rows)]
+    return [*run_tables(summary), *kept_tables(rows), *claim_tables(summary),
+            *sweep_tables(rows)]
 
 
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
@@ -148,7 +149,8 @@ def _runs(rows: Sequence[Row]) -> Iterator[Table]:
                 for run, of in _by_run(main, stage).items()])
 
 
-def _kept(rows: Sequence[Row]) -> Iterator[Table]:
+def kept_tables(rows: Sequence[Row]) -> Iterator[Table]:
+    """Yield what back ends kept of the runs as they were, a table for each stage."""
     main = [row for row in rows if is_main(row)]
     for stage in dict.fromkeys(row['stage'] for row in main):
         table = [{'run': run, 'back end': BACK_END_TITLES[row['back_end']],
@@ -164,7 +166,8 @@ def _kept(rows: Sequence[Row]) -> Iterator[Table]:
         yield f'What back ends kept, {_stage_of(main, stage)}', table
 
 
-def _sweeps(rows: Sequence[Row]) -> Iterator[Table]:
+def sweep_tables(rows: Sequence[Row]) -> Iterator[Table]:
+    """Yield the errors over drift, false closures added, and right ones left out."""
     drifting = [row for row in rows
                 if _is_declared(row) and not row['checked'] and not row['claims']]
     if any(row['drift'] != 1.0 for row in drifting):
