@@ -310,7 +310,7 @@ def test_a_page_has_the_tables_of_every_sequence(tmp_path, monkeypatch):
     map_page = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(map_page)
     page = tmp_path / 'map.md'
-    page.write_text(f'Kept.\n\n{map_page.BEGIN}\nold\n{map_page.END}\n\nKept, too.\n')
+    page.write_text(f'Kept.\n\n{map_page.BEGIN}\nbygone\n{map_page.END}\n\nKept, too.\n')
     monkeypatch.setattr(map_page, 'PAGE', page)
     folders = [str(map_folder(tmp_path / name)) for name in ('one', 'two')]
     map_page.main(folders)
@@ -318,7 +318,7 @@ def test_a_page_has_the_tables_of_every_sequence(tmp_path, monkeypatch):
     text = page.read_text()
     assert text.startswith('Kept.\n')
     assert text.endswith('Kept, too.\n')
-    assert 'old' not in text
+    assert 'bygone' not in text
     assert [line for line in text.splitlines() if line.startswith('## ')] == [
         '## All sequences', '## one', '## two']
     assert '### two: absolute error in metres, whole run' in text

@@ -33,7 +33,7 @@ _LEGEND = """\
 Of attacks the largest mean error, for each back end apart; false closures are the most that any
 of them got. **Bold**: off by more than odometry alone. Checked: a geometric check behind the
 detector, of which the attacker did not know; a defence that is named was in the detector, and he
-knew."""
+knew. In the tables below, runs whose maps are the same share a line."""
 
 
 def overview(summaries: Summaries) -> Table:
@@ -124,7 +124,18 @@ def _details(summary: Mapping[str, Any]) -> list[Table]:
     claims = {'rows': rows, 'claims': [row for row in summary['claims']
                                        if (row['run'], row['setting']) in telling]}
     kept = kept_tables([row for row in rows if row['run'] != CLEAN])
-    return [*run_tables(summary), *kept, *claim_tables(claims), *sweep_tables(summary['rows'])]
+    runs = [(title, _merged(table)) for title, table in run_tables(summary)]
+    return [*runs, *kept, *claim_tables(claims), *sweep_tables(summary['rows'])]
+
+
+def _merged(table: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+    """Return the rows of a table with those together that say the same of several runs."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for row in table:
+        run, *cells = row.values()
+        groups.setdefault(tuple(cells), []).append(run)
+    return [dict(zip(table[0], ('<br>'.join(runs), *cells), strict=True))
+            for cells, runs in groups.items()]
 
 
 def _telling(summary: Mapping[str, Any]) -> set[tuple[str, str]]:
