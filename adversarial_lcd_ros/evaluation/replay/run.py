@@ -53,6 +53,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
+from adversarial_lcd_ros.evaluation.replay.unexplained import unexplained_edges
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
     finished_in_s,
@@ -192,8 +193,8 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
     labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
-    records = ask_check(records, {CLEAN: clean.clean, **{
-        name: run.forwarded for name, run in runs.items()}}, plan.lcd)
+    sent = {CLEAN: clean.clean, **{name: run.forwarded for name, run in runs.items()}}
+    records = ask_check(records, sent, plan.lcd)
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
         [graph.node_count for graph in clean.clean],
         [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd,
@@ -203,6 +204,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
             hung = plan.replay_of(attack['name'])
             attack['poster'] = {'kind': hung.poster, 'share': hung.poster_share,
                                 'spans': hung.poster_spans}
+    summary['unexplained_edges'] = unexplained_edges(sent, plan.lcd)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()
         if name not in plan.posters}
