@@ -280,6 +280,10 @@ def test_several_replays_make_one_table_each_against_its_own_clean_run(beside, t
     assert '| forger, vbow |' in table
     page = (out / 'report.html').read_text()
     assert 'Under forger, vbow' in page
+    still = tmp_path / 'still.png'
+    assert main(['render', str(out), '--output', str(still)]) == 0
+    assert cv2.imread(str(still)) is not None
+    assert main(['render', str(out), '--output', str(tmp_path / 'film.gif')]) == 2
     assert main(['inspect', str(out)]) == 0
     assert main(['compare', str(out), str(out)]) == 0
 

@@ -76,7 +76,7 @@ def add_render(commands: Commands) -> None:
     parser.usage = f'{parser.prog} [RESULTS] [OPTIONS]'
     parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
                         metavar='RESULTS', help='results folder of a replay (default: '
-                        '%(default)s)')
+                        '%(default)s); for maps that "map" made also a folder of these')
     parser.add_argument('--output', type=Path, default=Path('map.gif'), metavar='FILE',
                         help='.gif or .mp4; .png or .svg: no '
                         'animation, the maps that "map" made (default: %(default)s)')
@@ -156,8 +156,10 @@ def _processes(jobs: int | None) -> int:
 
 
 def _render(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.kinds import open_results
     from adversarial_lcd_ros.evaluation.maps.animation import FORMATS, animate
     from adversarial_lcd_ros.evaluation.maps.report import FOLDER, STILLS, draw_still
+    from adversarial_lcd_ros.evaluation.maps.summary import KIND
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
     if options.steps < 1 or options.seconds < 0:
@@ -166,9 +168,11 @@ def _render(options: Namespace) -> None:
     if options.output.suffix not in (*FORMATS, *STILLS):
         raise ConfigError(f'--output {options.output}: expected a name that ends in '
                           f'{", ".join((*FORMATS, *STILLS))}')
-    _open_replay(options.folder)
+    is_map = options.output.suffix in STILLS and open_results(options.folder)[0].name == KIND
+    if not is_map:
+        _open_replay(options.folder)
     if options.output.suffix in STILLS:
-        draw_still(options.folder / FOLDER, options.output)
+        draw_still(options.folder if is_map else options.folder / FOLDER, options.output)
         print(options.output)
         return
     with _Bars() as bars, local_workers(_processes(options.jobs)) as workers:

@@ -79,10 +79,7 @@ def report_maps(folder: Path) -> Path:
 
 def render_section(folder: Path) -> str:
     """Return the section on the maps in a folder, as HTML."""
-    summary = read_json(folder / SUMMARY)
-    if (summary.get('kind'), summary.get('schema')) != (KIND, SCHEMA):
-        raise EvaluationError(f'{folder / SUMMARY} is not of the kind {KIND!r}, schema {SCHEMA}: '
-                              'make the maps again')
+    summary = _summary(folder)
     try:
         stages = [_stage(folder, summary, stage) for stage in (YOUNG, WHOLE)]
         values = {'summary': summary, 'stages': [stage for stage in stages if stage],
@@ -93,6 +90,14 @@ def render_section(folder: Path) -> str:
                               'make them again') from error
     section: str = load_template('map_section.html.j2').render(values)
     return section
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    summary = read_json(folder / SUMMARY)
+    if (summary.get('kind'), summary.get('schema')) != (KIND, SCHEMA):
+        raise EvaluationError(f'{folder / SUMMARY} is not of the kind {KIND!r}, schema {SCHEMA}: '
+                              'make the maps again')
+    return summary
 
 
 def _untold(summary: Mapping[str, Any]) -> list[tuple[str, int]]:
@@ -169,7 +174,7 @@ def draw_still(folder: Path, output: Path) -> None:
     if not (folder / SUMMARY).is_file():
         raise EvaluationError(f'{folder} has no maps: make them with "adversarial-lcd map '
                               f'{folder.parent}"')
-    summary = read_json(folder / SUMMARY)
+    summary = _summary(folder)
     shown = (shown_maps(folder, summary, YOUNG) or shown_maps(folder, summary, WHOLE))
     stream = io.BytesIO()
     with matplotlib.rc_context(STYLE):
