@@ -11,7 +11,6 @@ from textwrap import fill
 from typing import Any
 
 import matplotlib
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ CHECKED_COLOUR = '#2e8064'
 _PANEL, _LINE = 1.9, 0.12  # inches: a panel, and a line of text
 _TITLE, _LETTERS = 20, 12  # characters of a title on a line, and on an inch of it
 _MARGIN = 0.08  # of the extent, on every side
+_SIMPLER = 0.5  # of a point: what nobody sees of a path is left out
 _FALSE_WIDTH, _TRUTH_WIDTH, _MAP_WIDTH = 0.7, 2.6, 1.2
 
 
@@ -90,7 +90,7 @@ def draw_paths(shown: Sequence[Shown], width: float | None = None) -> Figure:
     back_ends = [fill(BACK_END_TITLES[back_end], letters) for back_end in columns]
     counts = (len(columns), len(shown)) if upright else (len(shown), len(columns))
     lines = max(title.count('\n') for title in run_titles) if upright else 0
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context({**STYLE, 'path.simplify_threshold': _SIMPLER}):
         figure = Figure(figsize=(wide * counts[1] + 0.3,
                                  high * counts[0] + 0.35 + _LINE * lines), layout='constrained')
         panels = figure.subplots(*counts, squeeze=False)
@@ -138,10 +138,12 @@ def draw_false(panel: Any, closures: Sequence[Sequence[Any]], kept: Sequence[int
                path: NDArray[np.float64]) -> None:
     """Draw false closures between the poses that they join."""
     for value, alpha in ((0, 0.28), (1, 0.9)):
-        lines = [path[[query, match]] for (query, match, is_false), was_kept
-                 in zip(closures, kept, strict=True) if is_false and was_kept == value]
-        panel.add_collection(LineCollection(lines, colors=FALSE_COLOUR, linewidths=_FALSE_WIDTH,
-                                            alpha=alpha))
+        lines = [np.vstack([path[[query, match]], [[np.nan, np.nan]]])
+                 for (query, match, is_false), was_kept in zip(closures, kept, strict=True)
+                 if is_false and was_kept == value]
+        if lines:  # in one piece: of hundreds of lines each would weigh more than its numbers
+            panel.plot(*np.concatenate(lines).T, color=FALSE_COLOUR, linewidth=_FALSE_WIDTH,
+                       alpha=alpha)
 
 
 def fix_panel(panel: Any, truth: NDArray[np.float64]) -> None:
