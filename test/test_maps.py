@@ -239,6 +239,9 @@ def test_runs_side_by_side_are_called_by_what_differs(beside):
         'forger, length check, length factor 3.0', 'clean, vbow', 'forger, vbow']
     assert [int(run.pairs.is_false.sum()) for run in inputs.runs.values()] == [0, 3, 0, 1, 0, 4]
     assert {run.run for run in inputs.runs.values()} == {'clean', 'forger'}
+    # Sweeps are of the first detector, also where an attack does more to another.
+    cases = list(plan_cases(inputs, MapConfig(draws=1), sweeps=True))
+    assert {case.setting for case in cases if case.drift != 1.0} == {''}
 
 
 def test_what_cannot_be_told_apart_or_compared_is_refused(beside, tmp_path):
@@ -292,19 +295,22 @@ def test_an_overview_takes_the_worst_of_each_back_end_and_marks_what_is_worse_th
     def row(run, back_end, error, setting='', stage='whole', **more):
         return {'run': run, 'setting': setting, 'stage': stage, 'back_end': back_end,
                 'ate_m': error, 'false': 3 if run == 'a' else 0, 'checked': False, 'drift': 1.0,
-                'added': None, 'missing': None, 'claims': '', **more}
+                'added': None, 'missing': None, 'claims': ''} | more
 
     rows = [row(run, back_end, error) for run, errors in (
         ('clean', (0.2, 0.1, 0.1)), ('a', (0.2, 1.5, 0.2001)), ('b', (0.2, 0.9, 0.3)))
         for back_end, error in zip(('odometry', 'least_squares', 'gnc'), errors, strict=True)]
     rows += [row('a', 'least_squares', 9.0, drift=3.0), row('a', 'least_squares', 9.0, added=3),
-             row('a', 'gnc', 0.1, 'length check'), row('a', 'odometry', 0.2, 'length check')]
+             row('a', 'gnc', 0.1, 'length check'), row('a', 'odometry', 0.2, 'length check'),
+             row('clean', 'gnc', 0.1, 'vbow', false=3),
+             row('clean', 'odometry', 0.2, 'vbow', false=3)]
     _, cells = overview({'tour': {'rows': rows}})
     found = [(each['run'], each['false closures'], each['least squares'], each['GNC'])
              for each in cells]
     assert found == [('clean', 'n/a / 0', 'n/a / 0.100', 'n/a / 0.100'),
                      ('worst attack', 'n/a / 3', 'n/a / **1.500**', 'n/a / **0.300**'),
-                     ('worst attack, length check', 'n/a / 3', 'n/a / n/a', 'n/a / 0.100')]
+                     ('worst attack, length check<br>clean, vbow', 'n/a / 3', 'n/a / n/a',
+                      'n/a / 0.100')]
 
 
 def test_a_page_has_the_tables_of_every_sequence(tmp_path, monkeypatch):

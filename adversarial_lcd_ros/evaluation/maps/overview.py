@@ -33,12 +33,12 @@ _LEGEND = """\
 Of attacks the largest mean error, for each back end apart; false closures are the most that any
 of them got. **Bold**: off by more than odometry alone. Checked: a geometric check behind the
 detector, of which the attacker did not know; a defence that is named was in the detector, and he
-knew. In the tables below, runs whose maps are the same share a line."""
+knew. Runs with the same figures share a line."""
 
 
 def overview(summaries: Summaries) -> Table:
     """
-    Return one table over sequences: the clean run and the worst attack, by back end.
+    Return one table over sequences: clean runs and the worst attack, by back end.
 
     Parameters
     ----------
@@ -47,19 +47,19 @@ def overview(summaries: Summaries) -> Table:
 
     """
     return _TABLE, [{'sequence': name, **cells} for name, summary in summaries.items()
-                    for cells in _sequence(summary)]
+                    for cells in _merged(list(_sequence(summary)))]
 
 
 def _sequence(summary: Mapping[str, Any]) -> Iterator[dict[str, str]]:
-    main = [row for row in summary['rows'] if is_main(row)]
-    first = main[0]['setting']
-    yield _cells('clean', [row for row in main if row['run'] == CLEAN and not row['checked']
-                           and row['setting'] == first])
-    attacked = [row for row in main if row['run'] != CLEAN]
-    for setting, checked in dict.fromkeys((row['setting'], row['checked']) for row in attacked):
-        title = title_of(_WORST, setting) + (', checked' if checked else '')
-        yield _cells(title, [row for row in attacked
-                             if (row['setting'], row['checked']) == (setting, checked)])
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in filter(is_main, summary['rows']):
+        title = title_of(CLEAN if row['run'] == CLEAN else _WORST, row['setting'])
+        groups.setdefault((row['setting'], title + (', checked' if row['checked'] else '')),
+                          []).append(row)
+    # Detector by detector, as they come; the clean run first.
+    settings = list(dict.fromkeys(setting for setting, _ in groups))
+    for (_, title), rows in sorted(groups.items(), key=lambda item: settings.index(item[0][0])):
+        yield _cells(title, rows)
 
 
 def _cells(title: str, rows: Sequence[Row]) -> dict[str, str]:

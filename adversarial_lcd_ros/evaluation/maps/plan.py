@@ -92,7 +92,8 @@ def _first(inputs: MapInputs) -> Declared:
 def _swept(inputs: MapInputs, stage: str, frames: int, draw: int,
            claims: Sequence[str]) -> Iterator[Case]:
     clean = _first(inputs)
-    worst = max(inputs.runs.values(), key=lambda run: int(run.pairs.is_false.sum()))
+    worst = max((run for run in inputs.runs.values() if run.setting == clean.setting),
+                key=lambda run: int(run.pairs.is_false.sum()))
     for drift in DRIFTS:
         for declared in [clean] + [worst] * (worst is not clean):
             for name in ('', *(name for name in claims if can_claim(declared, name))):
