@@ -457,8 +457,9 @@ class MapConfig(Config):
         choices=('noisy_truth', 'essential'))
     false_claim: str = setting(
         'identity', 'Relative pose that a false closure claims: the camera is where it was '
-        '(identity), or that of the essential matrix of the features (essential).',
-        choices=('identity', 'essential'))
+        '(identity); all of a run by one displacement, that of the first, as views of a sheet '
+        'that hangs in two places do (consistent); or that of the essential matrix of the '
+        'features (essential).', choices=('identity', 'consistent', 'essential'))
     closure_rotation_deg: float = setting(
         1.0, 'Closures: standard deviation about each axis, degrees.', low=1e-3, high=180.0)
     closure_translation_m: float = setting(

@@ -12,7 +12,7 @@ from adversarial_lcd_ros.evaluation.detectors import run as targets
 from adversarial_lcd_ros.evaluation.labels import run as label_runs
 from adversarial_lcd_ros.evaluation.labels.page import PATH, render_page
 from adversarial_lcd_ros.evaluation.maps.report import report_maps
-from adversarial_lcd_ros.evaluation.maps.summary import summarise_cases
+from adversarial_lcd_ros.evaluation.maps.summary import SCHEMA, summarise_cases
 from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
 from adversarial_lcd_ros.evaluation.replay.records import make_records, write_records
 from adversarial_lcd_ros.evaluation.replay.report import write_report
@@ -102,10 +102,12 @@ def map_folder(path, *, off_m=0.5, lcd=None, labels=None):
             for run, error_m in (('clean', 0.1), ('attack', off_m)):
                 store.add(f'{run} {draw}', map_case(run, draw, truth, error_m))
         rows = list(store.rows.values())
-    summary = results.summary_document('map', 1, summarise_cases(rows), {
+    summary = results.summary_document('map', SCHEMA, summarise_cases(rows), {
         'sequence': 'tour', 'frames': 12, 'first_loop': None, 'period_s': 0.5, 'focal_px': 500.0,
-        'seed': 42, 'shown': ['clean 0', 'attack 0'],
-        'runs': [{'name': run, 'right': 1, 'false': 1, 'untold': 2, 'unlocated': 0}
+        'seed': 42, 'claims': [],
+        'shown': [{'key': f'{run} 0', 'run': run, 'setting': '', 'checked': False,
+                   'stage': 'whole'} for run in ('clean', 'attack')],
+        'runs': [{'run': run, 'setting': '', 'right': 1, 'false': 1, 'untold': 2, 'unlocated': 0}
                  for run in ('clean', 'attack')]})
     made.write_json(results.SUMMARY, summary)
     report_maps(path)
@@ -117,8 +119,8 @@ def map_case(run, draw, truth, error_m):
                'false_kept': 0, 'duration_s': 0.1, 'kept': [1, 0],
                'path': [[x + error_m, y, z] for x, y, z in truth]}
     return {'run': run, 'stage': 'whole', 'frames': 12, 'drift': 1.0, 'draw': draw, 'added': None,
-            'consistent': False, 'missing': None, 'checked': False, 'right': 1, 'false': 1,
-            'unposed': 0,
+            'consistent': False, 'missing': None, 'checked': False, 'setting': '',
+            'claims': '', 'right': 1, 'false': 1, 'unposed': 0,
             'back_ends': dict.fromkeys(('odometry', *BACK_ENDS), figures), 'truth': truth,
             'closures': [[9, 1, False], [11, 2, True]]}
 

@@ -159,7 +159,7 @@ def _plan(options: Namespace) -> Plan:
     if options.map:
         maps.check(options)
 
-    from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
+    from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
     from adversarial_lcd_ros.evaluation.replay.run import Plan
     from adversarial_lcd_ros.lcd.targets import builder_for
 
@@ -169,7 +169,8 @@ def _plan(options: Namespace) -> Plan:
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
-                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels)
+                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels,
+                posters=load_posters(options.recipe))
 
 
 def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
@@ -189,7 +190,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
     from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
-    made = maps.make(folder, options) if options.map else None
+    made = maps.make([folder], options) if options.map else None
     if options.json:
         print_json({'folder': str(folder), **as_document(summary),
                     **({} if made is None else {'map': made})})

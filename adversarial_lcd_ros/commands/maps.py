@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 import os
 from pathlib import Path
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
 
 PREFIX = 'map-'
+CLAIMS = ('essential', 'consistent')  # of evaluation/maps/cases, which is slow to import
 
 
 def add(commands: Commands) -> None:
@@ -37,11 +38,18 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands, 'map', 'Make maps of the closures that a replay declared, clean and attacked, '
         'and report how far they are off.', _map)
-    parser.usage = f'{parser.prog} [RESULTS] [OPTIONS]'
-    parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
+    parser.usage = f'{parser.prog} [RESULTS ...] [OPTIONS]'
+    parser.add_argument('folders', type=Path, nargs='*', default=[Path('results/latest')],
                         metavar='RESULTS', help='results folder of a replay (default: '
-                        '%(default)s); a folder "map" is made in it, and what is finished there '
-                        'is not made again')
+                        'results/latest); a folder "map" is made in it, and what is finished '
+                        'there is not made again. Several, of one sequence and of detectors that '
+                        'differ in a setting: their runs side by side')
+    parser.add_argument('--output', type=Path, metavar='FOLDER', help='folder of the maps, in '
+                        'place of "map"; several replays have to name one')
+    parser.add_argument('--claims', nargs='+', default=[], choices=CLAIMS, metavar='CLAIM',
+                        help='make maps by what closures may claim beside the settings, too: '
+                        'essential (all by the features), consistent (false ones agree with one '
+                        'another)')
     parser.add_argument('--export-g2o', type=Path, metavar='FOLDER', help='write the pose graph '
                         'of every run there, for any solver that reads g2o, and make no maps')
     parser.add_argument('--sweeps', action='store_true', help='vary the drift, add false '
@@ -68,7 +76,7 @@ def add_render(commands: Commands) -> None:
     parser.usage = f'{parser.prog} [RESULTS] [OPTIONS]'
     parser.add_argument('folder', type=Path, nargs='?', default=Path('results/latest'),
                         metavar='RESULTS', help='results folder of a replay (default: '
-                        '%(default)s)')
+                        '%(default)s); for maps that "map" made also a folder of these')
     parser.add_argument('--output', type=Path, default=Path('map.gif'), metavar='FILE',
                         help='.gif or .mp4; .png or .svg: no '
                         'animation, the maps that "map" made (default: %(default)s)')
@@ -100,27 +108,33 @@ def _map(options: Namespace) -> None:
     if options.export_g2o is not None:
         _export(options)
         return
-    summary = make(options.folder, options, source=options.sequence, sweeps=options.sweeps,
-                   jobs=options.jobs)
+    summary = make(options.folders, options, output=options.output, source=options.sequence,
+                   sweeps=options.sweeps, claims=options.claims, jobs=options.jobs)
     if options.json:
-        print_json({'folder': str(options.folder), **summary})
+        print_json({'folder': str(options.output or options.folders[0]), **summary})
         return
-    show(options.folder, summary)
+    show(options.output or options.folders[0], summary)
 
 
-def make(folder: Path, options: Namespace, *, source: str | None = None,
-         sweeps: bool = False, jobs: int | None = None) -> dict[str, Any]:
-    """Make the maps of a results folder and put them into its report; return their summary."""
+def make(folders: Sequence[Path], options: Namespace, *, output: Path | None = None,
+         source: str | None = None, sweeps: bool = False, claims: Sequence[str] = (),
+         jobs: int | None = None) -> dict[str, Any]:
+    """Make the maps of results folders, and their report; return their summary."""
     from adversarial_lcd_ros.evaluation.maps.report import FOLDER, report_maps
     from adversarial_lcd_ros.evaluation.maps.run import make_maps
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
-    kind, results = _open_replay(folder)
+    opened = [_open_replay(folder) for folder in folders]
+    if output is None and len(folders) > 1:
+        raise ConfigError(f'{len(folders)} replays: name a folder for their maps with --output')
     with _Bars() as bars, local_workers(_processes(jobs)) as workers:
-        summary = make_maps(folder, config_from_options(options, MapConfig), workers,
-                            source=source, sweeps=sweeps, command_line=sys.argv, progress=bars)
-    report_maps(folder / FOLDER)
-    kind.report(results)
+        summary = make_maps(folders, config_from_options(options, MapConfig), workers,
+                            output=output, source=source, sweeps=sweeps, claims=claims,
+                            command_line=sys.argv, progress=bars)
+    report_maps(output or folders[0] / FOLDER)
+    if output is None:
+        for kind, results in opened:
+            kind.report(results)
     return summary
 
 
@@ -142,8 +156,10 @@ def _processes(jobs: int | None) -> int:
 
 
 def _render(options: Namespace) -> None:
+    from adversarial_lcd_ros.evaluation.kinds import open_results
     from adversarial_lcd_ros.evaluation.maps.animation import FORMATS, animate
     from adversarial_lcd_ros.evaluation.maps.report import FOLDER, STILLS, draw_still
+    from adversarial_lcd_ros.evaluation.maps.summary import KIND
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
     if options.steps < 1 or options.seconds < 0:
@@ -152,9 +168,11 @@ def _render(options: Namespace) -> None:
     if options.output.suffix not in (*FORMATS, *STILLS):
         raise ConfigError(f'--output {options.output}: expected a name that ends in '
                           f'{", ".join((*FORMATS, *STILLS))}')
-    _open_replay(options.folder)
+    is_map = options.output.suffix in STILLS and open_results(options.folder)[0].name == KIND
+    if not is_map:
+        _open_replay(options.folder)
     if options.output.suffix in STILLS:
-        draw_still(options.folder / FOLDER, options.output)
+        draw_still(options.folder if is_map else options.folder / FOLDER, options.output)
         print(options.output)
         return
     with _Bars() as bars, local_workers(_processes(options.jobs)) as workers:
@@ -202,7 +220,7 @@ def _export(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.maps.run import export_g2o
 
     with _Bars() as bars:
-        paths = list(export_g2o(options.folder, options.export_g2o,
+        paths = list(export_g2o(options.folders, options.export_g2o,
                                 config_from_options(options, MapConfig),
                                 source=options.sequence, progress=bars))
     for path in paths:

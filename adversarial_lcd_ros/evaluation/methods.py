@@ -58,10 +58,10 @@ def whose(row: Mapping[str, Any]) -> str:
     Return whose an attack is: paper, ours, other, control, or bound; '' where nobody knows.
 
     'bound' looks into the detector and is no attack that anybody could carry out. 'other' is from
-    elsewhere in the literature, or of the user's own.
+    elsewhere in the literature, such as a poster alone, or of the user's own.
     """
     if row['mode'] == 'pass':
-        return 'control'
+        return 'other' if row.get('poster') else 'control'
     if not row['search']:
         return ''
     if is_yardstick(row):

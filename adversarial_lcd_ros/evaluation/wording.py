@@ -172,8 +172,15 @@ def meaning(summary: Mapping[str, Any]) -> list[str]:
     if not told:
         told.append('On this sequence no attack made the robot miss or imagine a place.')
     told += _meaning_of_check(summary, attack)
-    return [*told, 'All this takes somebody who can change graphs on their way from the builder '
+    return [*told, 'All this takes somebody who can hang a sheet in two places, and no access to '
+            'any message.' if _is_scene_alone(attack) else
+            'All this takes somebody who can change graphs on their way from the builder '
             'to the detector, or who can publish in the name of the builder.']
+
+
+def _is_scene_alone(attack: Attack) -> bool:
+    """Tell whether a poster hung, and messages were left alone."""
+    return bool(attack.get('poster')) and attack['mode'] == 'pass'
 
 
 def _meaning_of_check(summary: Mapping[str, Any], attack: Attack) -> list[str]:
@@ -220,6 +227,10 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
 
 
 def _effort(summary: Mapping[str, Any], attack: Attack) -> str:
+    if _is_scene_alone(attack):
+        hung = attack['poster']
+        return (f'a poster of {percent(hung["share"], 0)} of the frame ({hung["kind"]}) at '
+                f'{hung["spans"].replace(",", " and")} s, and no message changed')
     if attack.get('nodes_moved_mean'):
         return (f'{mean_count(attack["nodes_moved_mean"])} of {number(summary["nodes_mean"], 0)} '
                 'nodes changed in a graph on average')

@@ -85,8 +85,9 @@ def claim(pairs: Pairs, truth: Motions, config: MapConfig, rng: np.random.Genera
     Return the edges that a front end makes of declared closures.
 
     A right one claims its true relative pose with noise (``noisy_truth``), a false one that the
-    camera is where it was (``identity``); either may be measured from the features instead
-    (``essential``). A pair whose features give no pose makes no edge.
+    camera is where it was (``identity``), or all of them one displacement (``consistent``); either
+    may be measured from the features instead (``essential``). A pair whose features give no pose
+    makes no edge.
 
     Parameters
     ----------
@@ -103,7 +104,9 @@ def claim(pairs: Pairs, truth: Motions, config: MapConfig, rng: np.random.Genera
     # By query: a frame errs alike in two runs of one seed, whatever else they declare.
     noise = rng.standard_normal((len(truth), 6))[pairs.query] * sigma
     relative = moved(between(truth[pairs.match], truth[pairs.query]), noise)
-    relative[pairs.is_false] = np.eye(4)
+    relative[pairs.is_false] = (
+        consistent(pairs.chosen(pairs.is_false), truth)
+        if config.false_claim == 'consistent' and pairs.is_false.any() else np.eye(4))
     posed = np.ones(len(pairs), bool)
     by_features = ((pairs.is_false & (config.false_claim == 'essential'))
                    | (~pairs.is_false & (config.right_claim == 'essential')))

@@ -26,7 +26,7 @@ from adversarial_lcd_ros.evaluation.maps.report import report_maps
 from adversarial_lcd_ros.evaluation.maps.summary import KIND, SCHEMA
 from adversarial_lcd_ros.evaluation.results import SUMMARY
 
-_MAPS: Columns = {'sequence': str, 'frames': int, 'runs': list, 'shown': list,
+_MAPS: Columns = {'sequence': str, 'frames': int, 'runs': list, 'shown': list, 'claims': list,
                   'period_s': MEASURED, 'first_loop': NUMBER}
 
 
@@ -36,8 +36,9 @@ class MapResults(ResultsKind):
     name = KIND
     schema = SCHEMA
     columns = {
-        'run': str, 'stage': str, 'frames': int, 'drift': MEASURED, 'back_end': str, 'draws': int,
-        'added': NUMBER, 'consistent': bool, 'checked': bool, 'missing': NUMBER, 'ate_m': MEASURED,
+        'run': str, 'setting': str, 'claims': str, 'stage': str, 'frames': int,
+        'drift': MEASURED, 'back_end': str, 'draws': int, 'added': NUMBER, 'consistent': bool,
+        'checked': bool, 'missing': NUMBER, 'ate_m': MEASURED,
         'ate_ci95': INTERVAL, 'excess_m': NUMBER, 'excess_ci95': INTERVAL,
         **dict.fromkeys(('right', 'false', 'right_kept', 'false_kept', 'duration_s'), MEASURED),
         **dict.fromkeys(('rpe_m', 'rpe_deg'), NUMBER)}
@@ -49,7 +50,7 @@ class MapResults(ResultsKind):
         path = results.folder / SUMMARY
         check_columns(path, 'the maps', results.summary, _MAPS)
         for number, row in enumerate(results.rows, 1):
-            for name, known in (('stage', tables.STAGE_TITLES),
+            for name, known in (('stage', tables.STAGE_TITLES), ('claims', tables.CLAIM_TITLES),
                                 ('back_end', tables.BACK_END_TITLES)):
                 if row[name] not in known:
                     raise EvaluationError(f'{path} is damaged: {name} of row {number} is '

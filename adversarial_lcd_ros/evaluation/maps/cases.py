@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 import json
 from typing import Any
 
@@ -19,7 +19,7 @@ from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.digests import digest_of_parts
 from adversarial_lcd_ros.slam.accuracy import absolute_error_m, aligned, relative_error
 from adversarial_lcd_ros.slam.back_ends import Solution, solve
-from adversarial_lcd_ros.slam.closures import Closures, Pairs, claim, consistent
+from adversarial_lcd_ros.slam.closures import Pairs, claim
 from adversarial_lcd_ros.slam.motions import Motions
 from adversarial_lcd_ros.slam.odometry import drifting
 from adversarial_lcd_ros.slam.pose_graph import PoseGraph
@@ -30,6 +30,12 @@ YOUNG, WHOLE = 'young', 'whole'
 _STEPS, _CLAIMS, CHOICE = range(3)
 _CODE = ('slam', 'poses', 'evaluation/maps/cases')
 _SHOWN_DIGITS = 3  # millimetres
+# What closures claim beside what the settings say, by name: pose of the features for all, or
+# false ones that agree with one another.
+ESSENTIAL, CONSISTENT = 'essential', 'consistent'
+CLAIMS: Mapping[str, Mapping[str, Any]] = {
+    '': {}, ESSENTIAL: {'right_claim': ESSENTIAL, 'false_claim': ESSENTIAL},
+    CONSISTENT: {'false_claim': CONSISTENT}}
 
 Poses = Mapping[tuple[int, int], NDArray[np.float64] | None]
 
@@ -59,6 +65,10 @@ class Case:
         Right closures of the run, but for this share of them; None: as declared.
     checked : bool
         Those alone that a geometric check behind the detector bears out.
+    setting : str
+        Of the detector, where replays with several are side by side: what is another.
+    claims : str
+        One of ``CLAIMS``; empty: as the settings say.
 
     """
 
@@ -71,6 +81,23 @@ class Case:
     consistent: bool = False
     missing: float | None = None
     checked: bool = False
+    setting: str = ''
+    claims: str = ''
+
+    @property
+    def declared(self) -> str:
+        """Return the title of the run whose closures these are."""
+        return title_of(self.run, self.setting)
+
+    def settings(self, config: MapConfig) -> MapConfig:
+        """Return the settings by which this map is made."""
+        settings = CLAIMS[CONSISTENT] if self.consistent else CLAIMS[self.claims]
+        return replace(config, **settings)
+
+
+def title_of(run: str, setting: str) -> str:
+    """Return a run in words, and which detector it was."""
+    return f'{run}, {setting}' if setting else run
 
 
 GROUP = tuple(entry.name for entry in fields(Case) if entry.name != 'draw')
@@ -92,6 +119,7 @@ class Task:
     measured : mapping
         (match, query) to the pose that their features claim, where any is asked for.
     config : MapConfig
+        With the claims of the case.
     apart : int
         Frames between the two of a relative pose error.
 
@@ -108,9 +136,14 @@ class Task:
 
 def case_key(case: Case, truth: Motions, pairs: Pairs, measured: Poses, config: MapConfig,
              apart: int) -> str:
-    """Return the digest of all that a case's figures depend on, hexadecimal."""
+    """
+    Return the digest of all that a case's figures depend on, hexadecimal.
+
+    Whose closures they are is not among it: runs that declared the same share their maps.
+    """
     settings = {**asdict(config), 'draws': None, 'young_frames': None, 'apart': apart,
-                'case': asdict(case), 'code': code_digest(*_CODE)}
+                'case': [case.frames, case.drift, case.draw, is_shown(case)],
+                'code': code_digest(*_CODE)}
     poses = [(match, query, None if pose is None else pose.tolist())
              for (match, query), pose in sorted(measured.items())]
     return digest_of_parts([
@@ -124,16 +157,7 @@ def pose_graph_of(task: Task) -> PoseGraph:
     odometry = drifting(truth, config, case.drift, _random(config, case, _STEPS))
     closures = claim(task.pairs, truth, config, _random(config, case, _CLAIMS),
                      lambda match, query: task.measured[match, query])
-    if case.consistent and closures.pairs.is_false.any():
-        closures = _agreeing(closures, truth)
     return PoseGraph(truth[0], odometry, closures).first(case.frames)
-
-
-def _agreeing(closures: Closures, truth: Motions) -> Closures:
-    forged = closures.pairs.is_false
-    relative = closures.relative.copy()
-    relative[forged] = consistent(closures.pairs.chosen(forged), truth)
-    return Closures(closures.pairs, relative, closures.sigma)
 
 
 def _random(config: MapConfig, case: Case, purpose: int) -> np.random.Generator:
@@ -147,7 +171,7 @@ def choice_of(config: MapConfig, draw: int) -> np.random.Generator:
 
 
 def run_case(task: Task) -> tuple[str, Row]:
-    """Return the key of a case, and its row: figures by back end, and for draw 0 the paths."""
+    """Return the key of a case, and its row: figures by back end, for draw 0 with the paths."""
     case, graph = task.case, pose_graph_of(task)
     truth = task.truth[:case.frames]
     found: dict[str, Any] = {
@@ -157,7 +181,7 @@ def run_case(task: Task) -> tuple[str, Row]:
         found[back_end] = _figures(solution.poses, truth, task.apart, solution,
                                    graph.closures.pairs)
     pairs = graph.closures.pairs
-    row: Row = {**asdict(case), 'right': int((~pairs.is_false).sum()),
+    row: Row = {'frames': case.frames, 'right': int((~pairs.is_false).sum()),
                 'false': int(pairs.is_false.sum()),
                 'unposed': int((task.pairs.query < case.frames).sum()) - len(pairs),
                 'back_ends': found}
@@ -173,7 +197,8 @@ def run_case(task: Task) -> tuple[str, Row]:
 
 def is_shown(case: Case) -> bool:
     """Tell whether the paths of a case are kept for pictures."""
-    return case.draw == 0 and case.drift == 1.0 and case.added is None and case.missing is None
+    return (case.draw == 0 and case.drift == 1.0 and case.added is None
+            and case.missing is None and not case.claims)
 
 
 def _figures(poses: Motions, truth: Motions, apart: int, solution: Solution | None,

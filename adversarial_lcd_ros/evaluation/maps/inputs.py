@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import BuilderConfig, ConfigT, LabelConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.replay.recipe import POSTERS
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     NO_TRUTH,
@@ -61,6 +62,10 @@ class Declared:
         With a frame that has no ground truth pose.
     is_clean : bool
         The features that the detector got are those of the camera.
+    run : str
+        Its name in the replay.
+    setting : str
+        Of the detector, where replays with several are side by side: what is another.
 
     """
 
@@ -69,6 +74,8 @@ class Declared:
     untold: int
     unlocated: int
     is_clean: bool
+    run: str = CLEAN
+    setting: str = ''
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +95,7 @@ class MapInputs:
     truth : float64, (n, 4, 4)
         Camera to world.
     runs : mapping of str to Declared
-        The clean run first.
+        By title (``title_of``), a clean run first.
     elsewhere : bool, (n, n), or None
         Pairs that certainly show different places, the older frame old enough to be a match.
     first_loop : int or None
@@ -158,13 +165,19 @@ def read_inputs(folder: Path, name: str, source: str | None = None, *, labelled:
     labels = label_views(views, config, progress).labels if labelled else None
     if labels is not None:
         _check_same([record.kind for record in clean], labels.names, source)
-    has_poster = any(section['values'].get('poster', NONE) != NONE
-                     for section in configuration.get('settings', ()))
     return MapInputs(
         name, source, frame, views.stamp_ns[frame], of_trajectory(poses)[frame],
-        {run: _declared(rows, frame, has_poster) for run, rows in records.items()},
+        {run: _declared(rows, frame, _has_poster(configuration, run))
+         for run, rows in records.items()},
         None if labels is None else _elsewhere(labels, frame),
         int(loops[0]) if len(loops) else None, focal_px)
+
+
+def _has_poster(configuration: Mapping[str, Any], run: str) -> bool:
+    """Tell whether a poster hung in a run: in all of a replay, or in this one."""
+    return run in configuration.get(POSTERS, {}) or any(
+        section['values'].get('poster', NONE) != NONE
+        for section in configuration.get('settings', ()))
 
 
 def _elsewhere(labels: FrameLabels, frame: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -273,4 +286,5 @@ def _declared(rows: Sequence[QueryRecord], frame: NDArray[np.int64],
     return Declared(
         Pairs(table[:, 0], table[:, 1], table[:, 2].astype(bool)),
         None if not support or None in support else np.array(support, np.float64) >= 1,
-        untold, unlocated, not has_poster and not any(record.nodes_moved for record in rows))
+        untold, unlocated, not has_poster and not any(record.nodes_moved for record in rows),
+        rows[0].run)

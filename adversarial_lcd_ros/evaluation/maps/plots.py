@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import matplotlib
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,10 @@ from adversarial_lcd_ros.evaluation.store import Row
 TRUTH_COLOUR, ODOMETRY_COLOUR, MAP_COLOUR, FALSE_COLOUR = (
     '#c9cdd4', '#8c6d46', '#1f4e79', '#d62728')
 CHECKED_COLOUR = '#2e8064'
-_PANEL = 1.9  # inches
+_PANEL, _LINE = 1.9, 0.12  # inches: a panel, and a line of text
+_TITLE, _LETTERS = 20, 12  # characters of a title on a line, and on an inch of it
 _MARGIN = 0.08  # of the extent, on every side
+_SIMPLER = 0.5  # of a point: what nobody sees of a path is left out
 _FALSE_WIDTH, _TRUTH_WIDTH, _MAP_WIDTH = 0.7, 2.6, 1.2
 
 
@@ -62,38 +64,56 @@ def flat_axes(path: NDArray[np.float64]) -> NDArray[np.int64]:
     return axes
 
 
-def draw_paths(shown: Sequence[Shown], back_ends: Sequence[str] = BACK_ENDS) -> Figure:
+def draw_paths(shown: Sequence[Shown], width: float | None = None) -> Figure:
     """
     Draw odometry and maps over the truth, a row for each run, a column for each back end.
 
     Declared closures that certainly name another place are red lines between the poses that they
     pull together, thin where the back end rejected them.
+
+    Parameters
+    ----------
+    shown : sequence of Shown
+    width : float, optional
+        Inches; then runs are the columns, which fits a narrow page.
+
     """
-    columns = (ODOMETRY, *back_ends)
+    columns = (ODOMETRY, *BACK_ENDS)
     truth = np.array(shown[0].case['truth'])
     axes = flat_axes(truth)
-    with matplotlib.rc_context(STYLE):
-        size = panel_size(truth[:, axes])
-        figure = Figure(figsize=(size[0] * len(columns) + 0.3, size[1] * len(shown) + 0.35),
-                        layout='constrained')
-        panels = figure.subplots(len(shown), len(columns), squeeze=False)
-        for row, one in zip(panels, shown, strict=True):
+    upright = width is not None
+    wide, high = panel_size(truth[:, axes], width and (width - 0.3) / len(shown))
+    # A title is as long as the side of its panel.
+    letters = int(_LETTERS * wide) if upright else _TITLE
+    run_titles = [f'{fill(one.title, letters)}\n'
+                  + _closures(one.case, ',\n' if upright else ', ') for one in shown]
+    back_ends = [fill(BACK_END_TITLES[back_end], letters) for back_end in columns]
+    counts = (len(columns), len(shown)) if upright else (len(shown), len(columns))
+    lines = max(title.count('\n') for title in run_titles) if upright else 0
+    with matplotlib.rc_context({**STYLE, 'path.simplify_threshold': _SIMPLER}):
+        figure = Figure(figsize=(wide * counts[1] + 0.3,
+                                 high * counts[0] + 0.35 + _LINE * lines), layout='constrained')
+        panels = figure.subplots(*counts, squeeze=False)
+        for row, one in zip(panels.T if upright else panels, shown, strict=True):
             for panel, back_end in zip(row, columns, strict=True):
                 draw_map(panel, one, back_end, axes)
-            row[0].set_ylabel(f'{one.title}\n{_closures(one.case)}', fontsize=8.0)
-        for panel, back_end in zip(panels[0], columns, strict=True):
-            panel.set_title(BACK_END_TITLES[back_end], fontsize=9.0)
+        tops, sides = (run_titles, back_ends) if upright else (back_ends, run_titles)
+        for panel, text in zip(panels[0], tops, strict=True):
+            panel.set_title(text, fontsize=7.5 if upright else 9.0)
+        for panel, text in zip(panels[:, 0], sides, strict=True):
+            panel.set_ylabel(text, fontsize=8.0)
     return figure
 
 
-def panel_size(flat: NDArray[np.float64]) -> tuple[float, float]:
+def panel_size(flat: NDArray[np.float64], wide: float | None = None) -> tuple[float, float]:
     """Return width and height of a panel for a path (n, 2), inches."""
-    wide, high = np.ptp(flat, axis=0) + 1e-9
-    return _PANEL, float(np.clip(_PANEL * high / wide, 0.4 * _PANEL, 1.4 * _PANEL)) + 0.25
+    wide = wide or _PANEL
+    across, up = np.ptp(flat, axis=0) + 1e-9
+    return wide, float(np.clip(wide * up / across, 0.4 * wide, 1.4 * wide)) + 0.25
 
 
-def _closures(case: Row) -> str:
-    return f'{case["right"]} right, {case["false"]} false'
+def _closures(case: Row, between: str) -> str:
+    return f'{case["right"]} right{between}{case["false"]} false'
 
 
 def draw_map(panel: Any, one: Shown, back_end: str, axes: NDArray[np.int64]) -> None:
@@ -118,10 +138,12 @@ def draw_false(panel: Any, closures: Sequence[Sequence[Any]], kept: Sequence[int
                path: NDArray[np.float64]) -> None:
     """Draw false closures between the poses that they join."""
     for value, alpha in ((0, 0.28), (1, 0.9)):
-        lines = [path[[query, match]] for (query, match, is_false), was_kept
-                 in zip(closures, kept, strict=True) if is_false and was_kept == value]
-        panel.add_collection(LineCollection(lines, colors=FALSE_COLOUR, linewidths=_FALSE_WIDTH,
-                                            alpha=alpha))
+        lines = [np.vstack([path[[query, match]], [[np.nan, np.nan]]])
+                 for (query, match, is_false), was_kept in zip(closures, kept, strict=True)
+                 if is_false and was_kept == value]
+        if lines:  # in one piece: of hundreds of lines each would weigh more than its numbers
+            panel.plot(*np.concatenate(lines).T, color=FALSE_COLOUR, linewidth=_FALSE_WIDTH,
+                       alpha=alpha)
 
 
 def fix_panel(panel: Any, truth: NDArray[np.float64]) -> None:
@@ -157,16 +179,17 @@ def draw_errors(shown: Sequence[Shown], time_s: NDArray[np.float64], width: floa
             odometry = _off(shown[0].case, ODOMETRY)
             panel.plot(time_s[:len(odometry)], odometry, color=ODOMETRY_COLOUR, linewidth=1.0,
                        linestyle=(0, (4, 2)))
-            for one in shown:
+            for number, one in enumerate(shown):
                 off = _off(one.case, back_end)
-                panel.plot(time_s[:len(off)], off, color=one.colour, linewidth=1.1)
+                # Where two maps are the same, the one below is seen on both sides of the other.
+                below = 1 - number / max(len(shown) - 1, 1)
+                panel.plot(time_s[:len(off)], off, color=one.colour, linewidth=1.1 + 2.0 * below)
             panel.set_title(BACK_END_TITLES[back_end], loc='left', fontsize=9.0)
             panel.set_yscale('log')
             panel.grid(color=GRID, linewidth=0.6)
         for panel in panels[::2]:
             panel.set_ylabel('off, metres')
-        for panel in panels[-2:]:
-            panel.set_xlabel('time in the sequence, seconds')
+        figure.supxlabel('time in the sequence, seconds', fontsize=9.0)
     return figure
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.maps import plots
-from adversarial_lcd_ros.evaluation.maps.cases import WHOLE, YOUNG
+from adversarial_lcd_ros.evaluation.maps.cases import WHOLE, YOUNG, title_of
 from adversarial_lcd_ros.evaluation.maps.plots import CHECKED_COLOUR, Shown, colour_of
 from adversarial_lcd_ros.evaluation.maps.summary import KIND, SCHEMA
 from adversarial_lcd_ros.evaluation.maps.tables import (
@@ -36,10 +36,11 @@ from adversarial_lcd_ros.evaluation.results import (
     SUMMARY,
     read_json,
 )
-from adversarial_lcd_ros.evaluation.store import Row, read_cells
+from adversarial_lcd_ros.evaluation.store import read_cells
 from adversarial_lcd_ros.files.writing import write_bytes, write_text
 
 STILLS, _STILL_DPI = ('.png', '.svg'), 100
+_MOST_OTHERS = 2  # detectors beside the one that the worst attack fooled
 FOLDER, TABLES = 'map', 'tables.md'  # in a results folder of a replay, and in that
 
 
@@ -78,19 +79,31 @@ def report_maps(folder: Path) -> Path:
 
 def render_section(folder: Path) -> str:
     """Return the section on the maps in a folder, as HTML."""
-    summary = read_json(folder / SUMMARY)
-    if (summary.get('kind'), summary.get('schema')) != (KIND, SCHEMA):
-        raise EvaluationError(f'{folder / SUMMARY} is not of the kind {KIND!r}, schema {SCHEMA}: '
-                              'make the maps again')
+    summary = _summary(folder)
     try:
         stages = [_stage(folder, summary, stage) for stage in (YOUNG, WHOLE)]
         values = {'summary': summary, 'stages': [stage for stage in stages if stage],
-                  'tables': all_tables(summary), 'headline': headline(summary)}
+                  'tables': all_tables(summary), 'headline': headline(summary),
+                  'untold': _untold(summary)}
     except (LookupError, TypeError, ValueError) as error:
         raise EvaluationError(f'{folder} holds no whole maps ({type(error).__name__}: {error}): '
                               'make them again') from error
     section: str = load_template('map_section.html.j2').render(values)
     return section
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    summary = read_json(folder / SUMMARY)
+    if (summary.get('kind'), summary.get('schema')) != (KIND, SCHEMA):
+        raise EvaluationError(f'{folder / SUMMARY} is not of the kind {KIND!r}, schema {SCHEMA}: '
+                              'make the maps again')
+    return summary
+
+
+def _untold(summary: Mapping[str, Any]) -> list[tuple[str, int]]:
+    """Return how many closures of each run could not be told, those with none left out."""
+    return [(title_of(run['run'], run['setting']), run['untold'])
+            for run in summary['runs'] if run['untold']]
 
 
 def _stage(folder: Path, summary: Mapping[str, Any], stage: str) -> dict[str, Any] | None:
@@ -100,7 +113,8 @@ def _stage(folder: Path, summary: Mapping[str, Any], stage: str) -> dict[str, An
     time_s = np.arange(shown[0].case['frames'], dtype=np.float64) * summary['period_s']
     return {'title': stage_title(shown[0].case), 'legend': [(one.title, one.colour)
                                                             for one in shown],
-            'paths': _uri(plots.draw_paths(shown)),
+            'paths_wide': _uri(plots.draw_paths(shown)),
+            'paths_narrow': _uri(plots.draw_paths(shown, NARROW)),
             'errors_wide': _uri(plots.draw_errors(shown, time_s, WIDE)),
             'errors_narrow': _uri(plots.draw_errors(shown, time_s, NARROW))}
 
@@ -111,14 +125,33 @@ def _uri(figure: Figure) -> str:
 
 
 def shown_maps(folder: Path, summary: Mapping[str, Any], stage: str) -> list[Shown]:
-    """Return the clean run and the worst one, as it was and checked, of a stage."""
-    cases = {(case['run'], case['checked']): case for case in read_cells(folder)
-             if case['stage'] == stage and 'truth' in case and _is_of(case, summary)}
-    names = [run['name'] for run in summary['runs']]
+    """
+    Return the maps of a stage that are drawn.
+
+    The clean run, the worst one as it was and checked, and that attack on other detectors.
+    """
+    kept = {case['key']: case for case in read_cells(folder)}
+    cases = {_run_of(entry): {**kept[entry['key']], **entry}
+             for entry in summary['shown'] if entry['stage'] == stage}
     worst = worst_run(summary)
-    drawn = dict.fromkeys([(CLEAN, False), (worst, False), (worst, True)])
-    return [Shown(run_title(cases[key]), CHECKED_COLOUR if key[1] else
-                  colour_of(names.index(key[0])), cases[key]) for key in drawn if key in cases]
+    others = [run['setting'] for run in summary['runs']
+              if run['run'] == worst['run'] and run['setting'] != worst['setting']]
+    drawn = [(CLEAN, worst['setting'], False), _run_of(worst), (*_run_of(worst)[:2], True),
+             *((worst['run'], setting, False) for setting in others[:_MOST_OTHERS])]
+    names = list(dict.fromkeys(run['run'] for run in summary['runs']))
+    return [Shown(run_title({'run': run, 'setting': setting, 'checked': checked}),
+                  _colour(names.index(run), checked, others.index(setting) + 1
+                          if setting in others else 0), cases[run, setting, checked])
+            for run, setting, checked in dict.fromkeys(drawn)
+            if (run, setting, checked) in cases]
+
+
+def _colour(place: int, checked: bool, other: int) -> str:
+    return CHECKED_COLOUR if checked else colour_of(place + other)
+
+
+def _run_of(entry: Mapping[str, Any]) -> tuple[str, str, bool]:
+    return entry['run'], entry['setting'], entry.get('checked', False)
 
 
 def draw_still(folder: Path, output: Path) -> None:
@@ -141,7 +174,7 @@ def draw_still(folder: Path, output: Path) -> None:
     if not (folder / SUMMARY).is_file():
         raise EvaluationError(f'{folder} has no maps: make them with "adversarial-lcd map '
                               f'{folder.parent}"')
-    summary = read_json(folder / SUMMARY)
+    summary = _summary(folder)
     shown = (shown_maps(folder, summary, YOUNG) or shown_maps(folder, summary, WHOLE))
     stream = io.BytesIO()
     with matplotlib.rc_context(STYLE):
@@ -150,28 +183,26 @@ def draw_still(folder: Path, output: Path) -> None:
     write_bytes(output, stream.getvalue())
 
 
-def worst_run(summary: Mapping[str, Any]) -> str:
+def worst_run(summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attack with the most false closures; the clean run without attacks."""
-    attacks = summary['runs'][1:] or summary['runs']
-    return str(max(attacks, key=lambda run: int(run['false']))['name'])
-
-
-def _is_of(case: Row, summary: Mapping[str, Any]) -> bool:
-    # Cases of other settings may be there, too.
-    return case['key'] in summary['shown']
+    runs: list[dict[str, Any]] = summary['runs']
+    attacks = [run for run in runs if run['run'] != CLEAN]
+    return max(attacks or runs, key=lambda run: int(run['false']))
 
 
 def headline(summary: Mapping[str, Any]) -> str:
     """Return in a sentence what the attack with the most false closures did to the young map."""
-    main = [row for row in summary['rows'] if is_main(row) and not row['checked']]
-    if len(summary['runs']) < 2:
-        return ''
-    stage = main[0]['stage']
     worst = worst_run(summary)
+    if worst['run'] == CLEAN:
+        return ''
+    main = [row for row in summary['rows'] if is_main(row) and not row['checked']
+            and row['setting'] == worst['setting']]
     error = {(row['run'], row['back_end']): row['ate_m'] for row in main
-             if row['stage'] == stage}
-    least, gnc = ((error[CLEAN, name], error[worst, name]) for name in ('least_squares', 'gnc'))
-    return (f'Under {worst}, the {stage_title(main[0]).split(",")[0]} is off by '
+             if row['stage'] == main[0]['stage']}
+    least, gnc = ((error[CLEAN, name], error[worst['run'], name])
+                  for name in ('least_squares', 'gnc'))
+    return (f'Under {title_of(worst["run"], worst["setting"])}, the '
+            f'{stage_title(main[0]).split(",")[0]} is off by '
             f'{metres(least[1])} m with least squares ({metres(least[0])} m clean), by '
             f'{metres(gnc[1])} m with GNC ({metres(gnc[0])} m clean), and by '
             f'{metres(error[CLEAN, "odometry"])} m with odometry alone.')

@@ -20,7 +20,7 @@ from adversarial_lcd_ros.evaluation.store import Row
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.maps.inputs import MapInputs
 
-KIND, SCHEMA = 'map', 1
+KIND, SCHEMA = 'map', 2
 _MEANS = ('rpe_m', 'rpe_deg', 'right_kept', 'false_kept', 'duration_s')
 _COUNTS = ('right', 'false', 'unposed')
 
@@ -32,15 +32,15 @@ def summarise_cases(cases: Sequence[Row]) -> list[Row]:
     Parameters
     ----------
     cases : sequence of Row
-        From ``run_case``.
+        Columns of ``Case``, and what ``run_case`` found.
 
     Returns
     -------
     list of Row
         Columns of ``Case`` but for the draw, ``back_end`` ("odometry": without closures),
         ``draws``, ``ate_m`` with ``ate_ci95``, ``excess_m`` with ``excess_ci95`` (over the same
-        draws with the closures of the clean run, or with none added or left out; None for these
-        themselves), and means over the draws of what else a case has.
+        draws with the closures of the clean run of that detector, or with none added or left out;
+        None for these themselves), and means over the draws of what else a case has.
 
     """
     groups: dict[tuple[Any, ...], dict[int, Row]] = {}
@@ -88,12 +88,21 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def map_document(inputs: MapInputs, config: MapConfig, cases: Sequence[Row]) -> dict[str, Any]:
-    """Return the content of summary.json; ``shown`` are the keys of cases with paths."""
+def map_document(inputs: MapInputs, config: MapConfig, cases: Sequence[Row],
+                 claims: Sequence[Row] = ()) -> dict[str, Any]:
+    """
+    Return the content of summary.json.
+
+    ``shown`` names the cases with paths, by their keys in cells.jsonl; ``claims`` are from
+    ``claim_errors``.
+    """
     return summary_document(KIND, SCHEMA, summarise_cases(cases), {
         'sequence': inputs.name, 'frames': len(inputs.frame), 'first_loop': inputs.first_loop,
         'period_s': inputs.period_s, 'focal_px': inputs.focal_px, 'seed': config.seed,
-        'shown': [case['key'] for case in cases if 'truth' in case],
-        'runs': [{'name': name, 'right': int((~run.pairs.is_false).sum()),
+        'claims': list(claims),
+        'shown': [{name: case[name] for name in ('key', 'run', 'setting', 'checked', 'stage')}
+                  for case in cases if 'truth' in case],
+        'runs': [{'run': run.run, 'setting': run.setting,
+                  'right': int((~run.pairs.is_false).sum()),
                   'false': int(run.pairs.is_false.sum()), 'untold': run.untold,
-                  'unlocated': run.unlocated} for name, run in inputs.runs.items()]})
+                  'unlocated': run.unlocated} for run in inputs.runs.values()]})

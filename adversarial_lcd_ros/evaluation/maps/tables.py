@@ -5,11 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from adversarial_lcd_ros.config import BACK_ENDS
-from adversarial_lcd_ros.evaluation.maps.cases import ODOMETRY, WHOLE, YOUNG
+from adversarial_lcd_ros.evaluation.maps.cases import (
+    CONSISTENT,
+    ESSENTIAL,
+    ODOMETRY,
+    WHOLE,
+    YOUNG,
+    title_of,
+)
+from adversarial_lcd_ros.evaluation.maps.claims import QUANTILES
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.wording import UNDEFINED, mean_count, number
@@ -18,6 +26,7 @@ BACK_END_TITLES: Mapping[str, str] = {
     ODOMETRY: 'odometry alone',
     **dict(zip(BACK_ENDS, ('least squares', 'Huber', 'Cauchy', 'GNC'), strict=True))}
 STAGE_TITLES = {YOUNG: 'young map', WHOLE: 'whole run'}
+CLAIM_TITLES = {'': 'as set', ESSENTIAL: 'by features', CONSISTENT: 'false ones agree'}
 
 Table = tuple[str, list[dict[str, str]]]
 
@@ -50,12 +59,15 @@ def row_title(row: Mapping[str, Any]) -> str:
              STAGE_TITLES[row['stage']]]
     if row['drift'] != 1.0:
         parts.append(f'{row["drift"]:g} times the drift')
+    if row['claims']:
+        parts.append(f'claims {CLAIM_TITLES[row["claims"]]}')
     return ', '.join(parts)
 
 
 def run_title(row: Mapping[str, Any]) -> str:
-    """Return whose closures a map has, and whether they were checked."""
-    return f'{row["run"]}, checked' if row['checked'] else str(row['run'])
+    """Return whose closures a map has, of which detector, and whether they were checked."""
+    title = title_of(row['run'], row['setting'])
+    return f'{title}, checked' if row['checked'] else title
 
 
 def closures_title(row: Mapping[str, Any]) -> str:
@@ -72,19 +84,50 @@ def _is_declared(row: Mapping[str, Any]) -> bool:
 
 
 def is_main(row: Mapping[str, Any]) -> bool:
-    """Tell whether a row is of a run as it was, and no sweep."""
-    return _is_declared(row) and row['drift'] == 1.0
+    """Tell whether a row is of a run as it was, with claims as set, and no sweep."""
+    return _is_declared(row) and row['drift'] == 1.0 and not row['claims']
 
 
 def all_tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Return the tables of a summary: runs by stage, what was kept, then the sweeps."""
+    """Return the tables of a summary: runs by stage, what was kept, claims, then the sweeps."""
     rows = summary['rows']
-    return [*run_tables(summary), *_kept(rows), *_sweeps(rows)]
+    return [*run_tables(summary), *kept_tables(rows), *claim_tables(summary),
+            *sweep_tables(rows)]
 
 
 def run_tables(summary: Mapping[str, Any]) -> list[Table]:
     """Return the errors of the runs as they were, a table for each stage."""
     return list(_runs(summary['rows']))
+
+
+def claim_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Return the errors by what closures claim, and how far features' claims are off."""
+    rows = [row for row in summary['rows'] if _is_declared(row) and not row['checked']]
+    several = {(row['run'], row['setting']) for row in rows if row['claims']}
+    tables = []
+    if several:
+        table = [{'run': run_title(of[0]), 'claims': CLAIM_TITLES[of[0]['claims']],
+                  **_map_cells(of[0]), 'closures right / false': _closures(of), **_errors(of)}
+                 for of in _together(row for row in rows
+                                     if (row['run'], row['setting']) in several)]
+        tables.append(('Absolute error in metres, by what closures claim', table))
+    if summary['claims']:
+        tables.append((
+            f'Poses by features beside the truth, right closures: median / {QUANTILES[1]:.0%} '
+            'of them below', [_claim_cells(row) for row in summary['claims']]))
+    return tables
+
+
+def _claim_cells(row: Row) -> dict[str, str]:
+    def both(name: str, digits: int) -> str:
+        return ' / '.join(number(value, digits) for value in row[name])
+
+    return {'run': title_of(row['run'], row['setting']),
+            'right with a pose': f'{row["right_posed"]} of {row["right"]}',
+            'false with a pose': f'{row["false_posed"]} of {row["false"]}',
+            'rotation off, degrees': both('rotation_deg', 1),
+            'direction off, degrees': f'{both("direction_deg", 0)} (of {row["moved"]})',
+            'translation off, m': both('translation_m', 2), 'true motion, m': both('true_m', 2)}
 
 
 def markdown(tables: Sequence[Table]) -> str:
@@ -106,12 +149,13 @@ def _runs(rows: Sequence[Row]) -> Iterator[Table]:
                 for run, of in _by_run(main, stage).items()])
 
 
-def _kept(rows: Sequence[Row]) -> Iterator[Table]:
+def kept_tables(rows: Sequence[Row]) -> Iterator[Table]:
+    """Yield what back ends kept of the runs as they were, a table for each stage."""
     main = [row for row in rows if is_main(row)]
     for stage in dict.fromkeys(row['stage'] for row in main):
         table = [{'run': run, 'back end': BACK_END_TITLES[row['back_end']],
                   'error more than clean': with_interval(row['excess_m'], row['excess_ci95'])
-                  if run != CLEAN else '',
+                  if row['run'] != CLEAN or row['checked'] else '',
                   'right kept': f'{count(row["right_kept"])} of {count(row["right"])}',
                   'false kept': f'{count(row["false_kept"])} of {count(row["false"])}',
                   'relative error, m': metres(row['rpe_m']),
@@ -122,14 +166,16 @@ def _kept(rows: Sequence[Row]) -> Iterator[Table]:
         yield f'What back ends kept, {_stage_of(main, stage)}', table
 
 
-def _sweeps(rows: Sequence[Row]) -> Iterator[Table]:
-    drifting = [row for row in rows if _is_declared(row) and not row['checked']]
+def sweep_tables(rows: Sequence[Row]) -> Iterator[Table]:
+    """Yield the errors over drift, false closures added, and right ones left out."""
+    drifting = [row for row in rows
+                if _is_declared(row) and not row['checked'] and not row['claims']]
     if any(row['drift'] != 1.0 for row in drifting):
-        drifted = {(row['run'], row['stage']) for row in drifting if row['drift'] != 1.0}
-        chosen = [row for row in drifting if (row['run'], row['stage']) in drifted]
+        drifted = {(run_title(row), row['stage']) for row in drifting if row['drift'] != 1.0}
+        chosen = [row for row in drifting if (run_title(row), row['stage']) in drifted]
         yield 'Absolute error in metres, over the drift of the odometry', [
-            {'run': of[0]['run'], **_map_cells(of[0]), **_errors(of)}
-            for of in _grouped(chosen, 'run', 'stage', 'drift')]
+            {'run': run_title(of[0]), **_map_cells(of[0]), **_errors(of)}
+            for of in _grouped(chosen, 'run', 'setting', 'stage', 'drift')]
     for name, title in (('added', 'over the number of false closures'),
                         ('missing', 'over the share of right closures that are missing')):
         chosen = [row for row in rows if row[name] is not None]
@@ -153,6 +199,15 @@ def _by_run(rows: Sequence[Row], stage: str) -> dict[str, list[Row]]:
         if row['stage'] == stage:
             groups.setdefault(run_title(row), []).append(row)
     return groups
+
+
+def _together(rows: Iterable[Row]) -> list[list[Row]]:
+    """Return rows of one map together, in the order in which they come, stage by stage."""
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row['stage'], run_title(row), row['drift'], row['claims']),
+                          []).append(row)
+    return list(groups.values())
 
 
 def _grouped(rows: Sequence[Row], *names: str) -> list[list[Row]]:

@@ -1,19 +1,24 @@
 # Copyright 2026 adversarial_lcd_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recipes of whole replays: attacks by name."""
+"""Recipes of whole replays: attacks by name, and posters that hang while they run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.config import AttackConfig
+from adversarial_lcd_ros.attack.images.posting import spans_in
+from adversarial_lcd_ros.config import AttackConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.recipes import LIVE, read_recipe
+from adversarial_lcd_ros.registry import NONE
 
 MAX_ATTACKS = 1000
-_MAX_NAME = 200
+REPLAY = 'replay'  # of an attack: settings of the poster that hangs while it runs
+POSTERS = 'posters'  # where configuration.json says in which runs one hung
+_MAX_NAME, _POSTER = 200, 'poster'
 
 
 def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
@@ -33,25 +38,70 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
         There is no such recipe, or it is not of the expected form.
 
     """
+    path, entries = _entries(name)
+    attacks: dict[str, AttackConfig] = {}
+    for title, entry in entries:
+        if title in attacks or title == 'clean':
+            raise ConfigError(f'recipe {path}: the name {title!r} is taken')
+        settings = {name: value for name, value in entry.items()
+                    if name not in ('name', REPLAY)}
+        attacks[title] = AttackConfig.from_mapping({**settings, **overrides})
+    if len(attacks) > MAX_ATTACKS:
+        raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
+                          f'expected at most {MAX_ATTACKS}')
+    return attacks
+
+
+def load_posters(name: str) -> dict[str, dict[str, Any]]:
+    """
+    Return the settings of ``bag_replay`` by which a poster hangs in a run, by its name.
+
+    Parameters
+    ----------
+    name : str
+        As for ``load_recipe``.
+
+    Raises
+    ------
+    ConfigError
+        As ``load_recipe``; or settings are no poster's, or no poster.
+
+    """
+    path, entries = _entries(name)
+    return {title: _poster(f'recipe {path}, {title}', entry[REPLAY])
+            for title, entry in entries if REPLAY in entry}
+
+
+def _entries(name: str) -> tuple[Path, Iterator[tuple[str, dict[str, Any]]]]:
+    """Return the path of a recipe, and what yields name and settings of its attacks."""
     path, content = read_recipe(name)
     if content.pop('protocol') != LIVE:
         raise ConfigError(f'recipe {path} is for whole evaluations: "adversarial-lcd evaluate '
                           'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
     if set(content) != {'attacks'}:
         raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
-    attacks: dict[str, AttackConfig] = {}
-    for entry in content['attacks']:
-        if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
-            raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
-        title = entry['name']
-        if not title.isprintable() or len(title) > _MAX_NAME:
-            raise ConfigError(f'recipe {path}: the name {title[:_MAX_NAME]!r} is longer than '
-                              f'{_MAX_NAME} characters, or not all of them can be printed')
-        if title in attacks or title == 'clean':
-            raise ConfigError(f'recipe {path}: the name {title!r} is taken')
-        settings = {name: value for name, value in entry.items() if name != 'name'}
-        attacks[title] = AttackConfig.from_mapping({**settings, **overrides})
-    if len(attacks) > MAX_ATTACKS:
-        raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
-                          f'expected at most {MAX_ATTACKS}')
-    return attacks
+
+    def named() -> Iterator[tuple[str, dict[str, Any]]]:
+        for entry in content['attacks']:
+            if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
+                raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
+            title = entry['name']
+            if not title.isprintable() or len(title) > _MAX_NAME:
+                raise ConfigError(f'recipe {path}: the name {title[:_MAX_NAME]!r} is longer than '
+                                  f'{_MAX_NAME} characters, or not all of them can be printed')
+            yield title, entry
+
+    return path, named()
+
+
+def _poster(where: str, settings: Any) -> dict[str, Any]:
+    if not isinstance(settings, dict) or not all(
+            isinstance(name, str) and name.startswith(_POSTER) for name in settings):
+        # Other settings would give the run other frames than the clean one has.
+        raise ConfigError(f'{where}: {REPLAY} is {settings!r}: expected settings of a poster, '
+                          'such as {poster: cells, poster_spans: "6:8, 18:20"}')
+    hung = ReplayConfig.from_mapping(settings)
+    if hung.poster == NONE or not spans_in(hung.poster_spans):
+        raise ConfigError(f'{where}: {REPLAY} hangs no poster: expected poster, and poster_spans, '
+                          'when it is seen')
+    return settings

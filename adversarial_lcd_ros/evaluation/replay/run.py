@@ -9,14 +9,14 @@ run and the first attack start from the images, which shows whether the graphs c
 further attacks replay the clean graphs of the first. Frames, graphs, decisions and reports are
 equal in number, or the run fails: a figure over fewer frames is another figure. Replays are in
 lockstep with a window of four frames: builder, attacker and detector work side by side, and
-nothing is lost.
+nothing is lost. A run with a poster of its own always starts from the images.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 import shutil
@@ -43,6 +43,7 @@ from adversarial_lcd_ros.evaluation.replay.processes import (
     read_recording,
     run_pipeline,
 )
+from adversarial_lcd_ros.evaluation.replay.recipe import POSTERS
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     AttackRun,
@@ -98,6 +99,8 @@ class Plan:
         Of the bootstrap.
     sweep_labels : bool
         Label the decisions with other thresholds, too.
+    posters : mapping
+        Settings of the replay that hang a poster in a run, by its name.
 
     """
 
@@ -109,6 +112,11 @@ class Plan:
     rebuild: bool = False
     seed: int = 42
     sweep_labels: bool = False
+    posters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def replay_of(self, run: str) -> ReplayConfig:
+        """Return the settings by which a run is replayed."""
+        return replace(self.replay, **self.posters.get(run, {}))
 
 
 def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence[str] = (),
@@ -155,7 +163,9 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1, start_timeout_s=0.0))
     digest = plan_digest(bag, {'builder': plan.builder, 'lcd': plan.lcd, 'replay': plan.replay,
                                **{f'attack {name}': attack
-                                  for name, attack in plan.attacks.items()}}, plan.rebuild)
+                                  for name, attack in plan.attacks.items()},
+                               **{f'poster {name}': plan.replay_of(name)
+                                  for name in plan.posters}}, plan.rebuild)
     with own_domain() as domain, results_folder(output, digest) as folder:
         tell(f'ROS domain {domain}')
         with _kept(folder.path, tell):
@@ -169,7 +179,8 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
         _write(folder, plan, summary, records, command_line,
                {'ros_domain_id': domain, 'source': str(bag.resolve())},
-               telling_pictures(sequence, clean, runs, records, summary))
+               telling_pictures(sequence, clean, runs, records, summary, {
+                   name: plan.replay_of(name) for name in plan.posters}))
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
         return folder.finish(), summary
@@ -188,9 +199,15 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         [graph.node_count for graph in clean.clean],
         [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd,
         told_by=labels.told_by)
+    for attack in summary['attacks']:
+        if attack['name'] in plan.posters:
+            hung = plan.replay_of(attack['name'])
+            attack['poster'] = {'kind': hung.poster, 'share': hung.poster_share,
+                                'spans': hung.poster_spans}
     summary['unexplained_edges'] = unexplained_edges(sent, plan.lcd)
     summary['graphs_rebuilt_differently'] = {
-        name: _differing(clean.clean, run.clean) for name, run in runs.items()}
+        name: _differing(clean.clean, run.clean) for name, run in runs.items()
+        if name not in plan.posters}
     if plan.sweep_labels and sequence.trajectory:
         label = partial(label_graphs, clean.clean, sequence.trajectory, sequence.source)
         summary['label_sweep'] = sweep_labels(records, label, plan.labels)
@@ -220,6 +237,9 @@ def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
 def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
     if plan.rebuild:
         raise EvaluationError(f'{bag} has graphs and no images: nothing can be rebuilt')
+    if plan.posters:
+        raise EvaluationError(f'{bag} has graphs and no images to paste a poster into: expected '
+                              'a bag with images, or attacks without a poster')
     tell('the bag has graphs: they are used as they are, without a graph_builder')
     return replace(plan, builder=None)
 
@@ -253,9 +273,9 @@ class Replays:
         runs: dict[str, Recording] = {}
         earlier_s = 0.0
         for number, (name, attack) in enumerate([(CLEAN, None), *self._plan.attacks.items()]):
-            from_bag = self._plan.rebuild or number < 2
+            built = self._built_by(name)
             title = (f'run {number + 1} of {len(self._plan.attacks) + 1}: {name}'
-                     + ('' if from_bag else ' (from the graphs of run 2)'))
+                     + ('' if built is None else f' (from the graphs of run {built + 1})'))
             folder = self._folder / f'{number}'
             spent_s = finished_in_s(folder)
             if spent_s is not None:
@@ -266,23 +286,32 @@ class Replays:
             self._tell(title)
             began_s = time.monotonic()
             shutil.rmtree(folder, ignore_errors=True)
-            source, setup = self._source(number, attack, from_bag)
+            source, setup = self._source(number, name, built)
             runs[name] = run_pipeline(source, setup, folder, self._domain, self._tell)
             _check(name, runs[name], self._frames)
             mark_finished(folder, time.monotonic() - began_s)
         return runs, earlier_s
 
-    def _source(self, number: int, attack: AttackConfig | None,
-                from_bag: bool) -> tuple[Path, Setup]:
-        """Return the bag of a run and the settings of its nodes."""
+    def _built_by(self, name: str) -> int | None:
+        """Return the number of the run whose clean graphs a run starts from; None: from images."""
         plan = self._plan
-        if not from_bag:
+        first = next((number for number, attack in enumerate(plan.attacks, 1)
+                      if attack not in plan.posters), None)
+        if plan.rebuild or name == CLEAN or name in plan.posters or first is None:
+            return None
+        return None if list(plan.attacks)[first - 1] == name else first
+
+    def _source(self, number: int, name: str, built: int | None) -> tuple[Path, Setup]:
+        """Return the bag of a run and the settings of its nodes."""
+        plan, attack = self._plan, self._plan.attacks.get(name)
+        if built is not None:
             # The recording holds the chosen frames only: nothing is to be skipped again.
             every = ReplayConfig()
             replay = replace(plan.replay, start_s=every.start_s, duration_s=every.duration_s,
                              stride=every.stride)
-            return self._folder / '1' / RECORDING, Setup(None, plan.lcd, replay, attack)
-        setup = Setup(plan.builder, plan.lcd, plan.replay, attack)
+            return (self._folder / f'{built}' / RECORDING,
+                    Setup(None, plan.lcd, replay, attack))
+        setup = Setup(plan.builder, plan.lcd, plan.replay_of(name), attack)
         if not isinstance(self._sequence, GraphSequence):
             return self._bag, setup
         # Where the graphs enter the pipeline depends on whether somebody is in the middle.
@@ -324,5 +353,5 @@ def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
            extra: Mapping[str, Any], pictures: Sequence[Picture]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed,
-                       extra)
+                       {**extra, **({POSTERS: dict(plan.posters)} if plan.posters else {})})
     write_results(folder, summary, records, pictures)

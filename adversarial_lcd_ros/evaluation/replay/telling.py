@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adversarial_lcd_ros.attack.images.posting import Posting
+from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
@@ -36,8 +38,13 @@ def _images(sequence: CameraSequence | GraphSequence,
 
 def telling_pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
                      runs: Mapping[str, Recording], records: Sequence[QueryRecord],
-                     summary: Mapping[str, Any]) -> list[Picture]:
-    """Return query, match and attacked graph of telling frames of the strongest attack."""
+                     summary: Mapping[str, Any],
+                     posters: Mapping[str, ReplayConfig] | None = None) -> list[Picture]:
+    """
+    Return query, match and attacked graph of telling frames of the strongest attack.
+
+    ``posters``: how runs were replayed in which a poster hung; their pictures show it.
+    """
     if not runs:
         return []
     attack = strongest(summary)
@@ -48,12 +55,15 @@ def telling_pictures(sequence: CameraSequence | GraphSequence, clean: Recording,
         clean.clean[record.match_frame].stamp_ns for record in chosen
         if record.match_frame is not None}
     image = _images(sequence, wanted)
+    run, hung = runs[name], (posters or {}).get(name)
+    if hung is not None and not isinstance(sequence, GraphSequence):
+        posting = Posting(hung, int(sequence.stamps_ns[0]))
+        image = {stamp: posting.on_pixels(pixels, stamp) for stamp, pixels in image.items()}
     pictures = []
     for record in chosen:
         title, caption = describe(record, by_run[CLEAN][record.frame])
-        match = clean.clean[record.match_frame if record.match_frame is not None
-                            else record.frame]
-        run = runs[name]
+        match = run.clean[record.match_frame if record.match_frame is not None
+                          else record.frame]
         pictures.append(Picture(f'{title} ({name})', caption, np.asarray(draw_attack(
             image[record.stamp_ns], run.clean[record.frame], image[match.stamp_ns], match,
             run.forwarded[record.frame]), np.uint8)))
