@@ -66,7 +66,8 @@ def targets_folder(path, *, accuracy=0.75, lcd=None, labels=None):
     rows = [{**row, 'protocol': 'pairs', 'n_pairs': 18, 'distinct_pairs': 17, 'seeds': 1},
             {**row, 'protocol': 'live', 'n_frames': 60, 'wrong_matches': 1,
              'declared_elsewhere': 2, 'untold_matches': 3,
-             'latency_to_first_closure_s': 2.0}]
+             'latency_to_first_closure_s': 2.0, 'block': 6, 'outcomes': ','.join(
+                 9 * ['TP'] + 9 * ['TN'] + 42 * [''])}]
     made.write_json(results.SUMMARY, results.summary_document(
         targets.KIND, targets.SCHEMA, rows))
     return path
