@@ -1,5 +1,6 @@
 # make demo: attack loop closure detection on the embedded tour; report in results/latest
 # make paper: the paper's experiments over the sequences in DATA; report in results/paper
+# make rings: attacks beside defences, and posters, on the sequences of RINGS; page in results/rings
 # make target: the detectors before any attack, on the sequences in DATA; tables in results/target
 # make test, make lint, make bench, make clean
 # make soak: an hour of faults (ARGS='--only messages'); docs/reliability.md tells what came of it
@@ -14,6 +15,7 @@ ARGS ?=
 DATA ?= ../shared/data
 PAPER ?= flat_tour office_tour bookstore_tour 7scenes_redkitchen rgbd_dataset_freiburg1_rpy \
   rgbd_dataset_freiburg3_long_office_household
+RINGS ?= flat_tour 7scenes_redkitchen office_tour
 MODELS ?= adversarial_lcd_ros/models
 TRAIN ?= flat_train
 VENV := .venv
@@ -30,8 +32,12 @@ LOCKED := $(PIP) install --no-deps --require-hashes --no-build-isolation -r
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo paper target test lint bench soak lock licences clean setup model
+.PHONY: demo paper rings target test lint bench soak lock licences clean setup model
 .DEFAULT_GOAL := demo
+
+# $(call there,TARGET,VARIABLE): whether the sequences that a variable names lie in DATA.
+there = for sequence in $($(2)); do test -e "$(DATA)/$${sequence%@*}" || { echo "error: there is \
+  no $(DATA)/$${sequence%@*}; make $(1) DATA=FOLDER, or $(2)='NAME ...' for others" >&2; exit 1; }; done
 
 demo: model
 	$(BIN)/adversarial-lcd demo $(ARGS)
@@ -40,14 +46,16 @@ demo: model
 # as MODELS detectors are trained there first, on TRAIN alone:
 #   make paper MODELS=results/flat_train_models ARGS='--output results/paper_flat_train'
 paper: model $(MODELS)/MODEL_CARD.json
-	@for sequence in $(PAPER); do test -e "$(DATA)/$${sequence%@*}" || { echo \
-	  "error: there is no $(DATA)/$${sequence%@*}; make paper DATA=FOLDER, or PAPER='NAME ...' for others" \
-	  >&2; exit 1; }; done
+	@$(call there,paper,PAPER)
 	$(BIN)/adversarial-lcd evaluate $(PAPER:%=$(DATA)/%) --recipe paper \
 	  --models $(MODELS) --output results/paper $(ARGS)
 
 $(MODELS)/MODEL_CARD.json: | model
 	$(BIN)/adversarial-lcd train $(TRAIN:%=$(DATA)/%) --output $(@D)
+
+rings: model
+	@$(call there,rings,RINGS)
+	$(BIN)/adversarial-lcd evaluate $(RINGS:%=$(DATA)/%) --recipe rings --output results/rings $(ARGS)
 
 target: model
 	$(BIN)/adversarial-lcd targets --recipe target --data $(DATA) --output results/target $(ARGS)

@@ -236,6 +236,9 @@ class LcdConfig(Config):
     rederive_neighbours: int = setting(
         6, 'Rederive, rederive_check: nearest features that a feature is joined with, as '
         'feature_neighbours of graph_builder.', low=0, high=50)
+    nearest_neighbours: int = setting(
+        12, 'Nearest_check: nearest features (K) that a feature may be joined with; at least '
+        'feature_neighbours of graph_builder.', low=0, high=10_000)
     common_share: float = setting(
         0.136, 'Defence common_part: least share of the features in what both frames see that '
         'match in place; the default is for graphs of about 300 features.', low=0.001, high=1.0)
@@ -549,6 +552,9 @@ class BagReplayNodeConfig(Config):
         'empty: none.')
     record_frames: bool = setting(
         True, 'Record what is replayed, too: camera frames, poses, detections.')
+    key: str = setting(
+        '', 'Lockstep: file of the key of lcd, where it has one; frames whose graph lcd refuses '
+        'for its seal are not waited for. Empty: every frame is.')
 
 
 @dataclass(frozen=True)

@@ -175,6 +175,7 @@ DEFENCES = Table('defence', 'lcd.defences.base:Defence', {
     'length_check': 'length_check:LengthCheck',
     'rederive': 'rederive:Rederive',
     'rederive_check': 'rederive:RederiveCheck',
+    'nearest_check': 'nearest_check:NearestCheck',
     'common_part': 'common_part:CommonPart',
 }, 'defences')
 

@@ -15,7 +15,7 @@ from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
 from adversarial_lcd_ros.graph import SCENE_CLASS
 from adversarial_lcd_ros.messages import codec
-from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
+from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble, in_variant
 from adversarial_lcd_ros.vision.features import Features
 from adversarial_lcd_ros.vision.objects import Detections
 
@@ -69,6 +69,22 @@ def test_the_scene_takes_what_no_box_holds_and_features_are_not_joined():
     assert graph.label[:3].tolist() == [50, 51, SCENE_CLASS]
     assert (graph.position[2].tolist(), graph.size[2].tolist()) == ([320, 240], [640, 480])
     assert codec.decode_graph(codec.encode_graph(graph)) == graph
+
+
+BOX = st.tuples(st.floats(0, 600), st.floats(0, 400), st.floats(1, 300), st.floats(1, 300))
+POINT = st.tuples(st.integers(0, 639), st.integers(0, 479))
+
+
+@given(st.lists(POINT, max_size=30), st.lists(BOX, max_size=4), st.integers(0, 6))
+def test_a_graph_turns_into_what_the_builder_makes_of_the_frame_in_the_other_variant(
+        features, objects, neighbours):
+    plain, anchored = (assembled(features, objects, neighbours, variant=variant)
+                       for variant in ('tiers', 'anchors'))
+    for graph in (plain, anchored):
+        for wanted in (plain, anchored):
+            assert in_variant(graph, BuilderConfig(
+                graph_variant='anchors' if wanted is anchored else 'tiers',
+                feature_neighbours=neighbours)) == wanted
 
 
 def test_without_objects_everything_hangs_on_the_scene():

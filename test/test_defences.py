@@ -88,6 +88,66 @@ def test_of_several_defences_edges_are_counted_once():
     assert Scoring(TARGETS['edges']()).unexplained(graph.flip([(0, 1)])) == 0
 
 
+@given(points, boxes, st.integers(0, 8), st.integers(0, 30))
+@settings(deadline=None)
+def test_whoever_passes_more_neighbours_takes_nothing_from_a_clean_graph(features, objects,
+                                                                         neighbours, more):
+    graph = received(features, objects, neighbours)
+    check = defence('nearest_check', nearest_neighbours=neighbours + more)
+    assert check.unexplained(graph) == 0
+    assert check.prepare(graph) == graph
+
+
+@given(points, boxes, st.integers(0, 4), st.integers(0, 8), st.data())
+@settings(deadline=None)
+def test_what_is_left_is_among_the_nearest_and_all_at_objects(features, objects, neighbours, more,
+                                                              data):
+    graph = received(features, objects, neighbours)
+    pairs = np.stack(np.triu_indices(graph.node_count, 1), axis=1)
+    chosen = data.draw(st.sets(st.integers(0, len(pairs) - 1), max_size=12)) if len(pairs) else ()
+    flipped = graph.flip(pairs[sorted(chosen)])
+    check = defence('nearest_check', nearest_neighbours=neighbours + more)
+    left = check.prepare(flipped)
+    changed = {tuple(pair) for pair in flipped.flips_to(left).tolist()}
+    assert check.unexplained(flipped) == len(changed)
+    # By brute force: how many other features are nearer, from either end.
+    first = graph.object_count
+    place = graph.position[first:].astype(float)
+    apart = np.linalg.norm(place[:, None] - place, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    for pair in pairs[sorted(chosen)]:
+        u, v = pair - first
+        nearer = u >= 0 and min((apart[end] < apart[u, v] - 1e-6).sum() for end in (u, v))
+        cannot_be = not graph.has_edges([pair])[0] and nearer >= neighbours + more
+        assert (tuple(pair) in changed) == (u < 0 or cannot_be)
+
+
+def test_an_edge_to_a_far_feature_is_dropped_and_one_to_an_object_is_put_back():
+    # Along a line: the nearest of each are those beside it.
+    graph = received([(20 * x + 300, 200) for x in range(8)], [(10, 10, 100, 100)], 2)
+    check = defence('nearest_check', nearest_neighbours=3)
+    # Node 0 is the object. The third nearest of node 1 is 4; 6 is none of those of 3, nor 3 of 6.
+    assert check.unexplained(graph.flip([(1, 4)])) == 0
+    for pair in [(3, 6), (0, 4)]:
+        flipped = graph.flip([pair])
+        assert check.unexplained(flipped) == 1
+        assert check.prepare(flipped) == graph
+    # One that was taken away between neighbours cannot be told.
+    taken = graph.flip([(3, 4)])
+    assert check.unexplained(taken) == 0
+    assert check.prepare(taken) == taken
+
+
+def test_with_the_scene_all_edges_follow_from_the_nodes():
+    graph = assembled(features=[(15, 15), (45, 45), (300, 90), (320, 240)], neighbours=2,
+                      objects=[(10, 10, 40, 40), (40, 40, 20, 20)], variant='anchors')
+    check = defence('nearest_check', nearest_neighbours=40)
+    assert check.prepare(graph) == graph
+    flipped = graph.flip([(0, 1), (0, 5), (4, 5)])
+    assert check.unexplained(flipped) == 3
+    assert check.prepare(flipped) == graph
+
+
 def credited(one, other, **values):
     """Return the edges of one graph that may recur in the other."""
     nodes = defence('length_check', **values).compare(Comparison(View(one), [View(other)]))

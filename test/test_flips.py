@@ -31,6 +31,7 @@ SETTINGS = {
     'length check': {'defences': 'length_check', 'length_factor': 1.3},
     'rederive': {'defences': 'rederive', 'rederive_neighbours': 2},
     'rederive, length check': {'defences': 'length_check, rederive', 'rederive_neighbours': 2},
+    'nearest check': {'defences': 'nearest_check', 'nearest_neighbours': 3},
     'hull': {'geometric_check': True, 'geometric_inliers': 8, 'geometric_hull': 0.9},
     'several': {'defences': 'own_defences:CountsLikeLengths, own_defences:DropsLongEdges',
                 'geometric_check': True, 'geometric_inliers': 15}}

@@ -16,12 +16,11 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames import attacked as frames
-from adversarial_lcd_ros.evaluation.frames.attacked import (
-    FrameSample,
-    attack_frames,
-    sample_frames,
-)
+from adversarial_lcd_ros.evaluation.frames.attacked import attack_frames
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.samples import FrameSample, sample_frames
+from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
+from adversarial_lcd_ros.lcd.defences.rederive import RederiveCheck
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages.types import LcdQuery
 
@@ -146,6 +145,68 @@ def test_an_attack_over_budget_fails_the_experiment(lcd, monkeypatch, overspent)
         attack(self, *given), **overspent))
     with pytest.raises(EvaluationError, match='does not keep to its budgets'):
         attack_frames(stream(), SAMPLE, CELLS[:1], lcd, seed=0)
+
+
+def test_edges_are_counted_where_a_defence_counts_them(lcd):
+    graphs = stream()
+    cells = [replace(CELLS[0], detector=(('defences', name),), aware=False)
+             for name in ('rederive_check', 'length_check')]
+    counted, not_counted = attack_frames(graphs, SAMPLE, cells, lcd, 42)
+    check = RederiveCheck(lcd)
+    for result in counted:
+        assert result.unexplained_clean == check.unexplained(result.result.clean)
+        assert result.unexplained == check.unexplained(result.result.perturbed)
+    assert any(result.result.flips.size for result in counted)
+    assert {(result.unexplained_clean, result.unexplained) for result in not_counted} == {
+        (None, None)}
+
+
+def sealed(search, aware):
+    attack = replace(ATTACK, search=search, perturbation='random_flip')
+    return Cell(search, attack, 'wl', 'wl', 'soft', 30, 2, 1, sealed=True, aware=aware)
+
+
+def test_who_knows_of_the_seal_sends_graphs_as_they_are_and_they_are_taken(lcd):
+    results, open_wire = attack_frames(stream(), SAMPLE, [sealed('recall', True), CELLS[0]],
+                                       lcd, 42)
+    assert [result.attacked for result in results] == [result.clean for result in results]
+    assert [result.clean for result in results] == [result.clean for result in open_wire]
+    assert any(result.attacked.is_loop for result in results)
+    assert {(result.refused, result.result.queries) for result in results} == {('', 0)}
+
+
+@pytest.mark.parametrize(('search', 'causes'), [
+    ('stepwise', {'seal'}), ('replay', {'replayed'})])
+def test_who_does_not_is_refused_and_the_loop_is_lost_in_plain_sight(lcd, search, causes):
+    cell = sealed(search, False)
+    results, open_wire = attack_frames(stream(changed=8), SAMPLE, [
+        cell, replace(cell, sealed=False)], lcd, 42)
+    assert [result.result for result in results] == [result.result for result in open_wire]
+    changed = [result for result in results if result.result.clean != result.result.perturbed]
+    assert changed
+    assert {result.refused for result in changed} == causes
+    assert not any(result.attacked.is_loop or result.attacked_is for result in changed)
+    assert all(result.refused == '' and result.attacked == result.clean
+               for result in results if result not in changed)
+
+
+def test_a_wire_refuses_what_is_not_the_builders():
+    graphs = [replace(graph, stamp_ns=5 * graph.stamp_ns) for graph in stream()]
+    wire = SealedWire(max_age_s=10.0)
+    for graph in graphs[:6]:
+        wire.carry(graph)
+    now = graphs[6]
+    assert wire.arrives(now, now) == (now, '')
+    assert wire.arrives(now, now.flip([(3, 9)])) == (None, 'seal')
+    # Graphs of 10 and of 15 s ago, under the present stamp: whoever has no key brings them back.
+    past = [replace(graph, stamp_ns=now.stamp_ns, sequence=now.sequence) for graph in graphs[3:5]]
+    assert wire.arrives(now, past[1]) == (None, 'replayed')
+    assert wire.arrives(now, past[0]) == (None, 'age')
+    # None of these left a trace.
+    wire.carry(now)
+    with pytest.raises(EvaluationError, match=r'clean graph 6 .* is refused \(replayed'):
+        wire.carry(now)
+    wire.carry(replace(graphs[7], session=3, sequence=0))
 
 
 def test_who_does_not_know_of_a_defence_asks_a_detector_without(lcd):

@@ -28,7 +28,8 @@ CELL = Cell('stepwise', AttackConfig(), 'wl', 'wl', 'soft', 300, 6, 10)
 @pytest.mark.parametrize('changed', [
     {'search': 'optimum'}, {'attack': AttackConfig(ratio=1e-4)},
     {'attack': AttackConfig(gamma='scale')}, {'target': 'edges'}, {'asked_target': 'edges'},
-    {'oracle': 'hard'}, {'nodes': 100}, {'frames': 5}, {'threshold': 0.9}])
+    {'oracle': 'hard'}, {'nodes': 100}, {'frames': 5}, {'threshold': 0.9}, {'sealed': True},
+    {'attack': AttackConfig(search='move_nodes', moved='spread'), 'search': 'move_nodes'}])
 def test_a_key_depends_on_every_setting(changed):
     assert cell_key(replace(CELL, **changed), 42, 'a', LcdConfig()) != (
         cell_key(CELL, 42, 'a', LcdConfig()))
@@ -107,6 +108,17 @@ def test_a_row_tells_what_happened():
     assert row['frame_results'][3]['trace'] == []
     assert row['variant'] == ''
     assert json.loads(json.dumps(row, allow_nan=False)) == row
+
+
+def test_a_row_counts_what_was_refused_and_what_nodes_do_not_explain():
+    counted = [replace(result, unexplained_clean=0, unexplained=2) for result in results()[:3]]
+    refused = replace(results()[3], unexplained_clean=1, refused='seal')
+    row = make_row(replace(CELL, sealed=True), 42, 'tour', [*counted, refused])
+    assert (row['sealed'], row['variant'], row['refused']) == (True, 'sealed graphs', 1)
+    assert (row['unexplained_clean_mean'], row['unexplained_mean']) == (0.25, 2.0)
+    assert [frame['refused'] for frame in row['frame_results']] == ['', '', '', 'seal']
+    plain = make_row(CELL, 42, 'tour', results())
+    assert (plain['refused'], plain['unexplained_mean']) == (0, None)
 
 
 def test_a_setting_without_a_column_is_named():

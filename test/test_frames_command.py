@@ -60,6 +60,14 @@ def test_it_announces_runs_reports_and_goes_on(tmp_path, command, capsys):
     assert 'all 10 cells are finished' in capsys.readouterr().err
 
 
+def test_the_command_line_says_how_many_frames(tmp_path, command, capsys):
+    assert command('--search', 'optimum', '--seeds', '1', '--frames', '1') == 0
+    entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
+    assert entry['frames'] == 2
+    assert command('--frames', '0') == 2
+    assert '--frames' in capsys.readouterr().err
+
+
 def test_settings_of_the_command_line_win(tmp_path, command):
     assert command('--search', 'optimum', '--builder-features', '12', '--seeds', '1') == 0
     entry, = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
@@ -148,6 +156,7 @@ attacks:
   - search: [recall, move_nodes, replay]
     ratio: 0.01
     detector: [{}, {defences: rederive}]
+  - {search: replay, sealed: true, aware: [true, false]}
 posters:
   pairs: 2
   shares: [0.1, 0.3]
@@ -165,15 +174,21 @@ def test_the_rings_are_run_reported_and_gone_on_with(tmp_path, command, capsys):
     summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
     assert summary['kind'] == 'rings'
     assert {(row['search'], row['defence']) for row in summary['rows']} == {
-        (search, defence) for search in ('recall', 'move_nodes', 'replay')
-        for defence in ('none', 'rederive')}
+        *((search, defence) for search in ('recall', 'move_nodes', 'replay')
+          for defence in ('none', 'rederive')), ('replay', 'sealed graphs')}
     # Edges that are made again cannot be attacked.
     assert all(row['decline_pp'] == 0 for row in summary['rows']
                if (row['search'], row['defence']) == ('recall', 'rederive'))
     # No poster, two sizes, another texture, two posters, a control; a check or none.
     assert len(summary['posters']) == 6 * 2
     assert {row['pairs'] for row in summary['posters']} == {2}
-    assert {entry['defence'] for entry in summary['prices']} == {'none', 'rederive'}
+    assert {(entry['target'], entry['defence']) for entry in summary['prices']} == {
+        ('wl', 'none'), ('wl', 'rederive'), ('wl', 'sealed graphs')}
+    # What is refused decides nothing, so that no loop is invented.
+    refused = [row for row in summary['rows'] if row['refused']]
+    assert [row['attack'] for row in refused] == ['replay, unaware']
+    assert refused[0]['invented'] == 0
+    assert '### Target wl' in page
     assert main(['report', str(tmp_path / 'out')]) == 0
     assert (tmp_path / 'out' / 'rings.md').read_text() == page
     hung = (tmp_path / 'out' / 'posters.json').read_bytes()

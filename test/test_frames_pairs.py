@@ -16,10 +16,11 @@ import yaml
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.frames.attacked import attack_frames, sample_pairs
+from adversarial_lcd_ros.evaluation.frames.attacked import attack_frames
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
+from adversarial_lcd_ros.evaluation.frames.samples import sample_pairs
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.flips import flip_logits
 from adversarial_lcd_ros.messages.types import LcdQuery

@@ -76,6 +76,14 @@ attacks:
     assert (detector.geometric_inliers, detector.min_gap_s) == (30, 3.0)
 
 
+def test_a_name_says_settings_of_the_attack(tmp_path):
+    text = 'protocol: frames\nattacks: [{search: move_nodes, nodes_moved: [5, 9], name: %s}]'
+    cells = load_cells(written(tmp_path, text % "'{nodes_moved} nodes'"), {})
+    assert [cell.name for cell in cells] == ['5 nodes', '9 nodes']
+    with pytest.raises(ConfigError, match='mode is no setting'):
+        load_cells(written(tmp_path, text % "'in {mode}'"), {})
+
+
 @pytest.mark.parametrize(('detector', 'said'), [
     ('{target: wl}', 'stand in the attack itself'), ('[1, 2]', 'settings by name'),
     ('{defences: moat}', 'no defence'), ('{gap: 1}', 'unknown setting')])

@@ -79,6 +79,10 @@ def test_objects_counts_what_recurs_in_class_size_and_arrangement():
     assert scores('objects', query, smaller)['objects'] == pytest.approx((21 / 41) ** 2)
     fewer = scores('objects', query.flip([[1, 2]]), query)
     assert max(fewer.values()) < 1
+    # The numbers of the classes are names, however large.
+    renamed = [make_graph(3, [(0, 1), (0, 2), *more], objects=3, **{
+        **fields, 'label': np.array([65_000, 7, 7], np.uint32)}) for more in ([], [(1, 2)])]
+    assert scores('objects', *renamed) == pytest.approx(fewer)
 
 
 @pytest.mark.parametrize('target', ['descriptors', 'vbow'])

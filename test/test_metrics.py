@@ -13,6 +13,7 @@ from adversarial_lcd_ros.evaluation.metrics import (
     first_closure_latency_s,
     measure,
     outcomes,
+    precision_recall,
     right,
 )
 
@@ -75,8 +76,8 @@ def test_average_precision_is_sklearns_when_all_matches_are_right():
     # Half of the loops matched wrongly cannot be found at any threshold.
     wrong = np.ones(200, bool)
     wrong[np.flatnonzero(kind > 0)[::2]] = False
-    assert measure(kind, probability >= 0.5, probability, wrong).curve.recall.max() == (
-        pytest.approx(np.mean(wrong[kind > 0])))
+    curve = precision_recall(kind, probability, wrong, np.ones(200, bool))
+    assert curve.recall.max() == pytest.approx(np.mean(wrong[kind > 0]))
 
 
 def test_nothing_matched_and_nothing_at_all():
@@ -85,7 +86,7 @@ def test_nothing_matched_and_nothing_at_all():
     assert (found.average_precision, found.recall_at_100_precision, found.recall) == (0, 0, 0)
     empty = measure(np.zeros(0, np.int8), np.zeros(0, bool), np.zeros(0), np.zeros(0, bool))
     assert empty.accuracy is None
-    assert empty.curve is None
+    assert empty.average_precision is None
     assert empty.precision is None
 
 
@@ -140,7 +141,8 @@ def test_a_match_of_which_nobody_knows_takes_its_frame_out():
     assert (found.positives, found.tp, found.fn, found.untold_matches) == (3, 1, 1, 1)
     assert (found.precision, found.recall, found.wrong_matches) == (1, 0.5, 0)
     # At the lowest threshold one loop is found, and of two others nobody knows.
-    assert found.curve.recall.tolist() == [1.0, pytest.approx(1 / 3)]
+    curve = precision_recall(kind, probability, correct, told)
+    assert curve.recall.tolist() == [1.0, pytest.approx(1 / 3)]
     before, after = np.array(['TP', 'TP', 'TN']), np.array(['FN', 'UM', 'TN'])
     change = effect(np.array([1, 1, -1], np.int8), before, after)
     assert (change.suppressed, change.diverted, change.left_out) == (1, 0, 1)

@@ -15,6 +15,7 @@ from adversarial_lcd_ros.attack.images.posting import Posting
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.files.keys import make_key
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.frame import decode
@@ -237,6 +238,32 @@ def test_a_bag_of_graphs_is_replayed_too(ros, tmp_path, lcd_model):
     assert node.work(ros.spin) == 0
     assert lcd.detector.keyframe_count == FRAMES
     ros.until(lambda: [graph.stamp_ns for graph in heard] == STAMPS)
+
+
+def test_under_a_key_frames_whose_graph_is_refused_are_not_waited_for(ros, bag, vocabulary,
+                                                                     lcd_model, tmp_path, capsys):
+    make_key(tmp_path / 'key')
+    key = {'key': str(tmp_path / 'key')}
+    attack, detector = {'search': 'recall', 'ratio': 0.003}, {'model': lcd_model, 'min_gap_s': 1.0}
+    lcd = ros.start(LcdNode, **detector, **key)
+    ros.start(GraphBuilderNode, 'graph:=graph_clean', detector='none', vocabulary=vocabulary,
+              features=60, **key)
+    ros.start(AttackerNode, **attack)
+    node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'), **key)
+    assert node.work(ros.spin) == 0
+    ros.stop(node)
+    clean, sent, decisions = (
+        [read(payload) for _, payload in read_payloads(tmp_path / 'record', topic)]
+        for topic, read in (('graph_clean', codec.decode_graph), ('graph', codec.decode_graph),
+                            ('loop_closures', codec.decode_loop_closure)))
+    run, forwarded = run_offline(clean, LcdConfig(**detector), AttackConfig(**attack), sealed=True)
+    assert sent == forwarded
+    assert decisions == list(run.decisions)
+    refused = sum(one != other for one, other in zip(clean, sent, strict=True))
+    assert 0 < refused == FRAMES - len(decisions) < FRAMES
+    ros.until(lambda: lcd.diagnostics['refused graph: unsealed'] == refused)
+    assert node.diagnostics['refused by lcd'] == refused
+    assert f'{len(decisions)} decisions, {refused} refused, ' in capsys.readouterr().out
 
 
 def test_stopping_ends_the_replay_with_exit_code_0(ros, bag, pipeline):

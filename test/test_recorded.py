@@ -16,6 +16,7 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.recorded import is_recording, read_recording
+from adversarial_lcd_ros.lcd.defences.rederive import RederiveCheck
 from adversarial_lcd_ros.messages.codec import (
     encode_attack_report,
     encode_graph,
@@ -86,6 +87,21 @@ def test_a_recording_is_reported_as_it_is(run, tmp_path, capsys):
     assert repeated in capsys.readouterr().err
     assert main(['inspect', str(tmp_path / 'results' / 'latest')]) == 0
     assert 'Decisions changed' in capsys.readouterr().out
+
+
+def test_edges_that_nodes_do_not_explain_are_counted_as_by_the_node(run, tmp_path):
+    bag = record(tmp_path / 'bag', run)
+    summary, report = evaluate(bag, tmp_path, '--lcd-defences', 'rederive_check')
+    check = RederiveCheck(LCD)
+    for name, graphs in (('clean', run[0]), ('recorded', run[1])):
+        counts = [check.unexplained(graph) for graph in graphs]
+        assert summary['unexplained_edges'][name] == {
+            'mean': sum(counts) / COUNT, 'graphs': sum(count > 0 for count in counts)}
+    assert summary['unexplained_edges']['clean'] != summary['unexplained_edges']['recorded']
+    assert 'Unexplained edges:' in report
+    plain, report = evaluate(bag, tmp_path)
+    assert plain['unexplained_edges'] is None
+    assert 'nexplained edges' not in report
 
 
 def test_other_settings_are_noticed(run, tmp_path):

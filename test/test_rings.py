@@ -8,25 +8,32 @@ import json
 from types import SimpleNamespace
 
 import cv2
+from graph_factory import make_graph
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 from results_factory import ring_row
 
-from adversarial_lcd_ros.config import LabelConfig, LcdConfig
+from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
-from adversarial_lcd_ros.evaluation.rings import report
+from adversarial_lcd_ros.evaluation.rings import plots, report
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
+    PairTask,
     PosterConfig,
     conditions_of,
     counts,
     poster_config,
+    poster_streams,
+    poster_tasks,
+    run_pair,
+    scene_of,
 )
+from adversarial_lcd_ros.evaluation.rings.prices import sealing_us
 from adversarial_lcd_ros.evaluation.rings.report import write_rings
 from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME, Condition, Scene
 from adversarial_lcd_ros.evaluation.rings.summaries import (
@@ -39,6 +46,11 @@ from adversarial_lcd_ros.evaluation.rings.summaries import (
     worst_cases,
 )
 from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
+from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
+from adversarial_lcd_ros.graph_sequences.opening import open_graphs
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.paths import share_path
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 CAMERA = Camera(np.eye(3), np.zeros(3), 0.785, 640, 480)
 
@@ -153,6 +165,32 @@ def test_the_worst_case_is_no_better_than_any_attack_of_its_rings():
                      ('rederive', WITHIN_R): 1.0, ('rederive', ANY): 0.5}
 
 
+SEALED = [ring_row('', 'recall', 'recall', [KEPT, LEFT], sealed=True),
+          ring_row('', 'replay', 'replay', [LOST, LEFT], sealed=True, aware=False)]
+for refused, result in zip(('age', 'replayed'), SEALED[1]['frame_results'], strict=True):
+    result['refused'] = refused
+
+
+def test_what_was_refused_is_counted_and_is_no_success_of_the_attacker():
+    held, lost = summarise(SEALED, 1)
+    assert {entry['defence'] for entry in (held, lost)} == {'sealed graphs'}
+    assert (held['refused'], lost['refused']) == ({}, {'age': 1, 'replayed': 1})
+    assert (held['decline_pp'], lost['decline_pp']) == (0, 50)
+    by_level = {each['level']: each for each in worst_cases(SEALED, 1)}
+    assert (by_level[WITHIN_R]['balanced'], by_level[WITHIN_R]['balanced_or_refused']) == (
+        1.0, None)
+    assert (by_level[ANY]['balanced'], by_level[ANY]['balanced_or_refused']) == (0.5, 1.0)
+
+
+def test_unexplained_edges_are_averaged_where_they_were_counted():
+    counted = ring_row('defences rederive_check', 'recall', 'recall', [KEPT, LEFT])
+    for at, frame in enumerate(counted['frame_results']):
+        frame |= {'unexplained_clean': 0, 'unexplained': 20 + at}
+    entry, other = summarise([counted, ROWS[0]], 1)
+    assert (entry['unexplained_clean_mean'], entry['unexplained_mean']) == (0.0, 20.5)
+    assert (other['unexplained_clean_mean'], other['unexplained_mean']) == (None, None)
+
+
 def test_a_threshold_is_a_defence_of_its_own():
     assert defence_title({'detector': '', 'threshold': 0.99}) == 'threshold 0.99'
     assert defence_title({'detector': 'defences x', 'threshold': 0.9}) == (
@@ -179,6 +217,44 @@ def test_the_page_is_of_the_summary_alone(tmp_path):
     assert (tmp_path / 'rings.svg').read_bytes().startswith(b'<?xml')
 
 
+def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
+    rows = [*ROWS, *SEALED, ring_row('', 'recall', 'recall', [LOST, LEFT], target='symbio')]
+    prices = [{'sequence': 'tour', 'target': target, 'defence': 'none', 'decision_us': 9.0,
+               'more_us': more} for target, more in (('wl', 0.0), ('symbio', 7.0))]
+    text = write_rings(tmp_path, rows, [], prices).read_text().replace('\u202f', ' ')
+    first, second = text.split('### Target wl')[1].split('### Target symbio')
+    assert '| tour | none | 100.0 % | 50.0 % (' in first
+    assert 'or refused 100.0 %' in first
+    assert '| tour | none | 100.0 % | 50.0 % (50.0 to 50.0; 1 attack) | n/a | n/a | +7 |' in (
+        second)
+    assert '## tour, wl: decline in points' in second
+    assert '2 refused |' in text
+    assert '| age 1, replayed 1 |' in text
+    assert 'Sealed graphs: builder and detector share a key.' in text
+    # A folder from before there were seals and counts.
+    old = tmp_path / 'old'
+    old.mkdir()
+    assert 'Sealed graphs' not in write_rings(old, ROWS, [], []).read_text()
+
+
+def test_the_same_nodes_close_and_far_apart_are_two_curves():
+    rows = summarise([ring_row('', 'move_nodes', name, [LOST, LEFT], moved=moved,
+                               variant=f'moved {moved}')
+                      for moved in ('close', 'spread') for name in ('40', '80')], 1)
+    for row, budget in zip(rows, (40, 80, 40, 80), strict=True):
+        row['node_budget_mean'] = budget
+    lines = plots._over(rows, 'nodes', 'move_nodes')
+    assert lines == {('tour', 'close: none'): {40: 50.0, 80: 50.0},
+                     ('tour', 'spread: none'): {40: 50.0, 80: 50.0}}
+
+
+def test_a_seal_has_a_price():
+    graphs = [replace(make_graph(300, [], objects=5, seed=seed), sequence=seed)
+              for seed in range(5)]
+    # An HMAC of some 20 kB at both ends.
+    assert 0 < sealing_us(graphs) < 100_000
+
+
 def test_posters_are_counted_by_condition():
     found = counts(POSTERS)
     assert len(found) == 2 * len(conditions_of(PosterConfig()))
@@ -202,13 +278,24 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
     assert {cell.search for cell in cells} == {
         'stepwise', 'recall', 'optimum', 'move_nodes', 'replay'}
     defences = {dict(cell.detector).get('defences', 'none') for cell in cells}
-    assert defences == {'none', 'rederive', 'length_check', 'geometric_check',
-                        'common_part', 'rederive, length_check, geometric_check'}
-    for named in defences:
+    assert defences == {'none', 'rederive', 'rederive_check', 'nearest_check', 'length_check',
+                        'geometric_check', 'common_part',
+                        'rederive, length_check, geometric_check'}
+    # What only counts edges judges as if it were not there.
+    for named in defences - {'rederive_check'}:
         searches = {cell.search for cell in cells if cell.aware
                     and dict(cell.detector).get('defences', 'none') == named}
         assert {'recall', 'move_nodes', 'replay'} <= searches
     assert any(cell.attack.lengths for cell in cells)
+    within = {dict(cell.detector).get('nearest_neighbours', 12) for cell in cells
+              if cell.detector and cell.attack.nearest == dict(cell.detector).get(
+                  'nearest_neighbours', 12)}
+    assert within == {12, 20, 40}
+    assert {(cell.search, cell.aware) for cell in cells if cell.sealed} == {
+        (search, aware) for search in ('recall', 'move_nodes', 'replay')
+        for aware in (True, False)}
+    assert {cell.method for cell in cells if cell.target == 'symbio'} == {
+        'eigencentrality', 'recall', 'replay', 'optimum'}
     assert dict(checks)['check and hull'] == LcdConfig(defences='geometric_check',
                                                        geometric_hull=0.1)
     assert {condition.count for condition in conditions_of(config)} == {0, 1, 2}
@@ -254,3 +341,57 @@ def test_a_folder_of_rings_is_read_reported_and_compared(tmp_path):
     (tmp_path / 'summary.json').write_text(json.dumps({**summary, 'worst': 3}))
     with pytest.raises(EvaluationError, match='damaged'):
         open_results(tmp_path)
+
+
+def test_each_detector_gets_posted_graphs_of_the_variant_it_needs(tmp_path):
+    source = f'{share_path("bags/flat_tour")}@0:0.12'
+    small = {'detector': 'none', 'features': 150}
+    stored = {variant: open_graphs(source, BuilderConfig(graph_variant=variant, **small),
+                                   tmp_path).graphs for variant in ('tiers', 'anchors')}
+    tiers = BuilderConfig(**small)
+    # The stream of another target's graphs does as well.
+    for variant, graphs in stored.items():
+        task = PairTask(
+            'tour', GraphSource(source, replace(tiers, graph_variant=variant), tmp_path,
+                                graphs_digest(graphs)), tiers, 5, 40, np.ones(43, bool),
+            (Condition('cells', 0.3), Condition('none', 0.0, 0, BARE)), ('wl', 'symbio'),
+            (('check', LcdConfig(defences='geometric_check')),), LcdConfig(min_gap_s=2.0),
+            0.82, 42)
+        rows = run_pair(task)
+        assert [(row['kind'], row['target'], row['check']) for row in rows] == [
+            (kind, target, check) for kind in ('cells', 'none') for target in ('wl', 'symbio')
+            for check in ('none', 'check')]
+        posted, _ = scene_of(task, graphs).posted(task.conditions[0])
+        for target, made in (('wl', 'tiers'), ('symbio', 'anchors')):
+            clean = stored[made]
+            with GraphBuilder(BuilderConfig(graph_variant=made, **small)) as builder:
+                built = {index: builder.build(image, clean[index].stamp_ns)
+                         for index, image in posted.items()}
+            detector = LoopClosureDetector(LcdConfig(target=target, min_gap_s=2.0))
+            for index in range(40):
+                detector.remember(built.get(index, clean[index]))
+            decision = detector.judge(built[40])
+            row = next(row for row in rows if row['target'] == target)
+            assert row['declared'] == decision.is_loop
+            assert row['to_poster'] == (decision.is_loop and decision.match_stamp_ns in {
+                clean[index].stamp_ns for index in (4, 5, 6)})
+        assert any(row['to_poster'] for row in rows if row['target'] == 'symbio')
+
+
+def some_stream(name, nodes, variant=''):
+    labels = SimpleNamespace(kind=np.zeros(30), elsewhere=np.ones((30, 30), bool),
+                             candidates=np.arange(30))
+    builder = BuilderConfig(graph_variant=variant or 'tiers')
+    return SimpleNamespace(name=name, nodes=nodes, variant=variant, labels=labels,
+                           graphs=GraphSource(name, builder, None, ''))
+
+
+def test_posters_hang_once_in_each_sequence_in_graphs_for_any_target():
+    tour, small, anchored = (some_stream('tour', 300), some_stream('tour', 100),
+                             some_stream('tour', 300, 'anchors'))
+    other = some_stream('other', 300, 'anchors')
+    assert poster_streams([small, tour, anchored, other]) == [tour, other]
+    for stream in (tour, other):
+        tasks = poster_tasks(stream, PosterConfig(pairs=2), LcdConfig(), (), LabelConfig())
+        assert [(task.graphs, task.builder) for task in tasks] == [
+            (stream.graphs, BuilderConfig())] * 2

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
 
-_OPTIONS = ('jobs', 'scheduler', 'seeds', 'only', 'cache')
+_OPTIONS = ('jobs', 'scheduler', 'seeds', 'frames', 'only', 'cache')
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -53,6 +53,9 @@ def add_options(parser: ArgumentParser) -> None:
                        help='run on a Dask cluster, tcp://HOST:PORT, in place of local processes')
     group.add_argument('--seeds', type=int, metavar='N',
                        help='seeds of every attack: 42, 43, ... (default: what the recipe says)')
+    group.add_argument('--frames', type=int, metavar='N',
+                       help='frames with a loop, and as many at new places, for each seed '
+                       '(default: what the recipe says)')
     group.add_argument('--only', action='append', metavar='PART',
                        help='a part of the recipe, alone or with others named the same way; what '
                        'is finished is not run again (default: all)')
@@ -125,7 +128,12 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     """Hang the posters of a recipe, measure what defences cost, write the page."""
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.rings.pictures import ring_pictures
-    from adversarial_lcd_ros.evaluation.rings.posters import PairTask, poster_config, poster_tasks
+    from adversarial_lcd_ros.evaluation.rings.posters import (
+        PairTask,
+        poster_config,
+        poster_streams,
+        poster_tasks,
+    )
     from adversarial_lcd_ros.evaluation.rings.report import (
         measured_prices,
         run_posters,
@@ -138,10 +146,11 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     tasks: list[PairTask] = []
     if posters[1] is not None:
         config, checks = poster_config(posters[1], posters[0])
+        hung = poster_streams(streams)
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared = run_posters(folder, streams, config, checks, lcd, labels, workers,
+            declared = run_posters(folder, hung, config, checks, lcd, labels, workers,
                                    progress)
-        tasks = [task for stream in streams
+        tasks = [task for stream in hung
                  for task in poster_tasks(stream, config, lcd, checks, labels)]
     write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
@@ -155,7 +164,7 @@ def _check(options: Namespace) -> None:
     if chosen_settings(options, ReplayConfig):
         raise ConfigError('settings of the replay are given, but nothing is replayed: name a '
                           'part of a sequence as PATH@FROM:TO')
-    check_counts(options, 'jobs', 'seeds')
+    check_counts(options, 'jobs', 'seeds', 'frames')
     if options.jobs is not None and options.scheduler is not None:
         raise ConfigError('--jobs and --scheduler: expected one of them; the cluster has its own '
                           'number of workers')
@@ -172,8 +181,8 @@ def _overrides(options: Namespace) -> dict[str, Any]:
         values['oracle'] = 'hard' if lcd['hard_answers'] else 'soft'
     if 'features' in builder:
         values['nodes'] = builder['features']
-    if options.seeds is not None:
-        values['seeds'] = options.seeds
+    values |= {name: getattr(options, name) for name in ('seeds', 'frames')
+               if getattr(options, name) is not None}
     return values
 
 
@@ -280,7 +289,9 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
     from adversarial_lcd_ros.evaluation.terminal import experiment_lines
 
     console = make_console()
-    tables, finding = experiment_lines(summarise_cells(rows))
+    # Whoever is refused deceives nobody: he is in the report, and no strongest attack.
+    open_wire = [row for row in rows if not row['sealed']]
+    tables, finding = experiment_lines(summarise_cells(open_wire or rows))
     for title, lines in tables:
         print_lines(title, lines)
     console.print(finding)

@@ -17,7 +17,7 @@ replay the classes are what they are (240 loops to 61 new places on flat_tour).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -75,8 +75,6 @@ class Metrics:
         Area under the precision-recall curve as a sum of steps; None without positives.
     mcc : float or None
         Matthews correlation coefficient, 0 if all decisions are alike; None if a class is empty.
-    curve : Curve or None
-        Precision over recall; None without positives.
 
     """
 
@@ -96,13 +94,6 @@ class Metrics:
     recall_at_100_precision: float | None
     average_precision: float | None
     mcc: float | None
-    curve: Curve | None = field(default=None, repr=False, compare=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return all figures but the curve, ready for JSON."""
-        values = asdict(self)
-        del values['curve']
-        return values
 
 
 @dataclass(frozen=True)
@@ -207,8 +198,7 @@ def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
     negatives = count['TN'] + count['FP']
     recall, specificity = _ratio(count['TP'], positives), _ratio(count['TN'], negatives)
     both = recall is not None and specificity is not None
-    scored = kind != 0
-    curve = _curve(kind[scored], probability[scored], match_correct[scored], told[scored])
+    curve = precision_recall(kind, probability, match_correct, told)
     return Metrics(
         positives=int((kind == POSITIVE).sum()), negatives=int((kind == NEGATIVE).sum()),
         tp=count['TP'], fn=count['FN'] + count['WM'],
@@ -219,7 +209,38 @@ def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
         precision=_ratio(count['TP'], declared), recall=recall, specificity=specificity,
         recall_at_100_precision=_recall_at_100_precision(curve),
         average_precision=_average_precision(curve),
-        mcc=_mcc(kind, outcome) if both else None, curve=curve)
+        mcc=_mcc(kind, outcome) if both else None)
+
+
+def precision_recall(kind: NDArray[np.int8], probability: NDArray[np.float64],
+                     match_correct: NDArray[np.bool_],
+                     match_told: NDArray[np.bool_]) -> Curve | None:
+    """
+    Return precision over recall of one run; None without positives.
+
+    Parameters
+    ----------
+    kind, probability, match_correct, match_told : (n,)
+        As in ``measure``.
+
+    """
+    # A frame with a wrong match can be no true positive at any threshold: to sklearn it is a
+    # negative. Recall is then of the loops that were matched, and is scaled to all loops but
+    # those that are declared with a match that cannot be told.
+    scored, is_loop = kind != 0, kind == POSITIVE
+    if not is_loop.any():
+        return None
+    known = scored & match_told
+    found = (is_loop & match_correct)[known]
+    if not found.any():  # sklearn warns and answers recall 1
+        threshold = np.unique(probability[scored])
+        return Curve(threshold, np.zeros(len(threshold)), np.zeros(len(threshold)))
+    precision, recall, threshold = precision_recall_curve(found, probability[known])
+    untold = np.sort(probability[is_loop & ~match_told])
+    declared = len(untold) - np.searchsorted(untold, threshold)
+    # sklearn's last point, (1, 0), stands for a threshold at which nothing is declared.
+    return Curve(threshold, precision[:-1],
+                 recall[:-1] * found.sum() / (is_loop.sum() - declared))
 
 
 def balanced_accuracy(kind: NDArray[np.int8], outcome: Outcomes) -> float | None:
@@ -277,25 +298,6 @@ def _check_lengths(**arrays: NDArray[Any]) -> None:
 
 def _ratio(part: int, whole: int) -> float | None:
     return part / whole if whole else None
-
-
-def _curve(kind: NDArray[np.int8], probability: NDArray[np.float64],
-           match_correct: NDArray[np.bool_], match_told: NDArray[np.bool_]) -> Curve | None:
-    # A frame with a wrong match can be no true positive at any threshold: to sklearn it is a
-    # negative. Recall is then of the loops that were matched, and is scaled to all loops but
-    # those that are declared with a match that cannot be told.
-    positives = int((kind == POSITIVE).sum())
-    if not positives:
-        return None
-    found = ((kind == POSITIVE) & match_correct)[match_told]
-    if not found.any():  # sklearn warns and answers recall 1
-        threshold = np.unique(probability)
-        return Curve(threshold, np.zeros(len(threshold)), np.zeros(len(threshold)))
-    precision, recall, threshold = precision_recall_curve(found, probability[match_told])
-    untold = np.sort(probability[(kind == POSITIVE) & ~match_told])
-    declared = len(untold) - np.searchsorted(untold, threshold)
-    # sklearn's last point, (1, 0), stands for a threshold at which nothing is declared.
-    return Curve(threshold, precision[:-1], recall[:-1] * found.sum() / (positives - declared))
 
 
 def _recall_at_100_precision(curve: Curve | None) -> float | None:

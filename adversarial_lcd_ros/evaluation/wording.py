@@ -275,8 +275,17 @@ def decline_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def figure_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Return the figures of the detector, one row a run: heading to cell."""
-    if not is_labelled(summary):
-        return _declared_rows(summary)
+    rows = _scored_rows(summary) if is_labelled(summary) else _declared_rows(summary)
+    counted = summary.get('unexplained_edges')
+    if counted:
+        names = ['clean', *(attack['name'] for attack in summary['attacks'])]
+        for name, row in zip(names, rows, strict=True):
+            row['unexplained edges'] = (f'{mean_count(counted[name]["mean"])} '
+                                        f'(in {counted[name]["graphs"]} graphs)')
+    return rows
+
+
+def _scored_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     runs = [('before', summary['clean'])]
     runs += [(attack_title(attack), attack) for attack in summary['attacks']]
     return [{

@@ -119,6 +119,12 @@ class Scoring:
         return max((defence.unexplained(graph) for defence in self.defences), default=0)
 
     @property
+    def counts_edges(self) -> bool:
+        """Whether a defence tells which edges it has no explanation for."""
+        return any(type(defence).unexplained is not Defence.unexplained
+                   for defence in self.defences)
+
+    @property
     def changes_graphs(self) -> bool:
         """Whether a defence may judge another graph than the one received."""
         return any(type(defence).prepare is not Defence.prepare for defence in self.defences)

@@ -11,8 +11,10 @@ if __name__ == '__main__':  # before the other imports: they take a second, and 
     raise SystemExit(run_node_process('bag_replay'))
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 import importlib
 from pathlib import Path
+import struct
 import time
 from typing import Any
 
@@ -23,19 +25,22 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros.attack.images.posting import Posting
-from adversarial_lcd_ros.errors import ConfigError, EvaluationError, SequenceError
+from adversarial_lcd_ros.errors import CodecError, ConfigError, EvaluationError, SequenceError
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.authentic import Gate
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
+from adversarial_lcd_ros.nodes.parameters import load_key
 from adversarial_lcd_ros.nodes.peers import Strangers, getting_ready
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import SessionWatch
+from adversarial_lcd_ros.sequences.cdr import cdr_stamp_ns
 from adversarial_lcd_ros.sequences.replay import BagRecorder, Replay
 from adversarial_lcd_ros.settings import NODE_CONFIGS
 from adversarial_lcd_ros.start import report
 
-GRAPHS = CLEAN, _ = 'graph_clean', 'graph'
+GRAPHS = CLEAN, FORWARDED = 'graph_clean', 'graph'
 DECISIONS, REPORTS = 'loop_closures', 'attack_report'
 RECORDED = (*GRAPHS, DECISIONS, REPORTS)
 _NOUNS = dict.fromkeys(GRAPHS, 'graph') | {DECISIONS: 'loop closure', REPORTS: 'report'}
@@ -86,10 +91,14 @@ class BagReplayNode(PipelineNode):
         self._clock_output = (self.create_publisher(Clock, '/clock', 10)
                               if self._config.clock else None)
         self._recorder = BagRecorder(Path(node_config.record)) if node_config.record else None
+        key = load_key(node_config.key)
+        # What lcd refuses is known here, too: it takes the same graphs in the same order.
+        self._gate = Gate(key) if key and self._config.lockstep else None
+        heard = RECORDED if self._recorder else (DECISIONS, *(FORWARDED,) * bool(self._gate))
         self._inputs = {
             topic: MirroredSubscription(self, UInt8MultiArray, topic, _NOUNS[topic],
                                         self._handler(topic), raw=True)
-            for topic in (RECORDED if self._recorder else (DECISIONS,))}
+            for topic in heard}
         self._broken: Exception | None = None
         self._restarts = SessionWatch(self.diagnostics, 'lcd', 'its keyframes are gone')
         self._strangers = Strangers(self, RECORDED)
@@ -118,7 +127,18 @@ class BagReplayNode(PipelineNode):
             self._record(topic, wire)
             if topic == DECISIONS:
                 self._on_decision(wire)
+            elif topic == FORWARDED and self._gate:
+                self._look_at_seal(self._gate, unwrap(wire))
         return on_message
+
+    def _look_at_seal(self, gate: Gate, payload: bytes) -> None:
+        """Wait no longer for the decision on a graph that is refused."""
+        try:
+            gate.take(payload)
+        except CodecError:
+            with suppress(SequenceError, struct.error):  # no header: it is of no frame
+                if self._under_way.pop(cdr_stamp_ns(payload), None) is not None:
+                    self.diagnostics.count('refused by lcd')
 
     def _record(self, topic: str, wire: bytes, message_type: str = WIRE_TYPE) -> None:
         if self._recorder is None or self._broken is not None:
@@ -158,8 +178,10 @@ class BagReplayNode(PipelineNode):
             self.get_logger().info(f'stopped after {self._published} frames')
             return EXIT_OK
         took_s = time.monotonic() - began_s
+        refused = self.diagnostics['refused by lcd']
         print(f'{self.default_name}: {self._published} frames, {self._decided} decisions, '
-              f'{took_s:.1f} s, {self._published / took_s:.1f} frames/s', flush=True)
+              + (f'{refused} refused, ' if refused else '')
+              + f'{took_s:.1f} s, {self._published / took_s:.1f} frames/s', flush=True)
         return EXIT_OK
 
     def _play(self, show: Callable[[int], None]) -> None:

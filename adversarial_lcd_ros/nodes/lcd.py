@@ -104,7 +104,8 @@ class LcdNode(PipelineNode):
             self.diagnostics.worry(
                 'unexplained edges', f'{strange} of {graph.edge_count} edges do not follow from '
                 'the nodes: somebody changed them, or graph_builder has another '
-                'feature_neighbours than rederive_neighbours here', strange)
+                'feature_neighbours than the defence expects (rederive_neighbours, or more than '
+                'nearest_neighbours)', strange)
 
     def _on_query(self, wire: bytes) -> None:
         # Decisions first: however many queries wait, a graph waits for one of them at most.

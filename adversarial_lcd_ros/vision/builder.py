@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -261,6 +263,37 @@ def assemble(features: Features, words: NDArray[np.uint32], objects: Detections,
         edge=edge,
         edge_length=(np.hypot(offset[:, 0], offset[:, 1]) / diagonal).astype(np.float32),
         word=bow[0], word_weight=bow[1])
+
+
+def in_variant(graph: MultiTierGraph, config: BuilderConfig) -> MultiTierGraph:
+    """
+    Return a graph in the variant of some settings: what a builder of these makes of the frame.
+
+    Features and objects are the same in both variants, edges follow from them, and no picture is
+    looked at.
+
+    Parameters
+    ----------
+    graph : MultiTierGraph
+        Of a builder with the same settings but for the variant.
+    config : BuilderConfig
+        Its variant and neighbours.
+
+    """
+    has_scene = config.graph_variant == ANCHORS
+    if graph.has_scene == has_scene:
+        return graph
+    place = graph.found_objects
+    scene: dict[str, Any] = {
+        'tier': OBJECT_TIER, 'label': SCENE_CLASS, 'score': 1, 'descriptor': 0,
+        'position': (graph.width / 2, graph.height / 2), 'size': (graph.width, graph.height)}
+    none: NDArray[np.uint32] = np.zeros((0, 2), np.uint32)
+    other = replace(graph, edge=none, edge_length=np.zeros(0, np.float32), **{
+        name: (np.insert(getattr(graph, name), place, value, axis=0) if has_scene else
+               np.delete(getattr(graph, name), place, axis=0)) for name, value in scene.items()})
+    edge = joined_pairs(other.position, other.size, other.object_count,
+                        config.feature_neighbours, has_scene)
+    return other.with_edges(edge, other.length_between(edge))
 
 
 def _with_scene(objects: Detections, width: int, height: int) -> Detections:

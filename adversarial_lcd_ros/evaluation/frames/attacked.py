@@ -16,7 +16,7 @@ The sample hangs on seed and sequence only: all attacks meet the same frames.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 import time
 from typing import Protocol
@@ -26,51 +26,16 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.attacker import Attacker, AttackResult
 from adversarial_lcd_ros.attack.oracle import Ask
-from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
-from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
+from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector
+from adversarial_lcd_ros.evaluation.frames.samples import FrameSample
+from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
 from adversarial_lcd_ros.graph import MultiTierGraph
-from adversarial_lcd_ros.ground_truth.labels import (
-    ELSEWHERE,
-    NEGATIVE,
-    POSITIVE,
-    RIGHT,
-    UNTOLD,
-    FrameLabels,
-)
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.messages.types import LcdAnswer, LcdQuery, LoopClosure
-
-_DRAW = 20_210  # of the one drawing that all seeds share
-
-
-@dataclass(frozen=True, eq=False)
-class FrameSample:
-    """
-    The frames to attack, and what ground truth says about them.
-
-    Attributes
-    ----------
-    frame : int64, (k,)
-        Indices in the stream, ascending.
-    kind : int8, (k,)
-        +1 a loop is there to be found, -1 a new place.
-    match_is : str, (k, n)
-        What is said of a match with each frame of the stream: ``FrameLabels.judge``.
-    told_by : str
-        What told the labels, ``FrameLabels.told_by``.
-    reference : int64, (k,), optional
-        By pairs: the earlier frame that each is held against. None: it is held against the map.
-
-    """
-
-    frame: NDArray[np.int64]
-    kind: NDArray[np.int8]
-    match_is: NDArray[np.str_]
-    told_by: str = ''
-    reference: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
@@ -87,6 +52,11 @@ class FrameResult:
     clean_is, attacked_is : str
         What is said of the match named, declared or not: ``FrameLabels.judge``.
     result : AttackResult
+    unexplained_clean, unexplained : int or None
+        Edges of the clean graph, and of the one that arrived, that defences have no explanation
+        for; None if none of them counts, or no graph arrived.
+    refused : str
+        Why the detector took no graph on this frame, and decided nothing; empty if it did.
     query_s, search_s, judge_s : float
         Processor time spent in the asked detector, in the rest of the attack, and on judging
         its outcome: what else the machine does is no matter.
@@ -102,6 +72,9 @@ class FrameResult:
     query_s: float
     search_s: float
     judge_s: float
+    unexplained_clean: int | None = None
+    unexplained: int | None = None
+    refused: str = ''
 
 
 class _Adversary(Protocol):
@@ -118,6 +91,16 @@ class _Yardstick:
 
     def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
         return self.optimum.process(graph)
+
+    def observe(self, graph: MultiTierGraph) -> None:
+        """Remember nothing."""
+
+
+class _Resigned:
+    """Knows that graphs are sealed, and sends them as they are."""
+
+    def attack(self, graph: MultiTierGraph, ask: Ask) -> AttackResult:
+        return AttackResult(graph, graph, 'skipped', 'what is changed would be refused')
 
     def observe(self, graph: MultiTierGraph) -> None:
         """Remember nothing."""
@@ -141,69 +124,13 @@ class _Timed:
 
 @dataclass
 class _Contest:
-    """A cell's attacker, and the detectors that it asks and that judge it."""
+    """A cell's attacker, the detectors that it asks and that judge it, and what is between."""
 
     adversary: _Adversary
     asked: LoopClosureDetector
     judging: LoopClosureDetector
+    wire: SealedWire | None = None
     results: list[FrameResult] = field(default_factory=list)
-
-
-def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
-    """
-    Draw frames with a loop, and as many at new places.
-
-    The frames of each kind are cut in time into ``per_kind`` parts, and one of each part is
-    drawn. Seeds that follow each other draw different frames, until a part is used up and begins
-    anew: then its frames are attacked again, with other random numbers. A kind with fewer frames
-    than asked for gives all it has, and one without any gives none.
-
-    Parameters
-    ----------
-    labels : FrameLabels
-        Of the stream.
-    per_kind : int
-        Frames of each kind.
-    seed : int
-        Of the cell.
-
-    """
-    chosen = []
-    for kind in (POSITIVE, NEGATIVE):
-        frames = np.flatnonzero(labels.kind == kind)
-        for part in np.array_split(frames, min(per_kind, len(frames)) or 1):
-            if len(part):
-                order = np.random.default_rng((_DRAW, int(part[0]))).permutation(part)
-                chosen.append(int(order[seed % len(part)]))
-    frame = np.array(sorted(chosen), np.int64)
-    every = np.arange(len(labels.kind))
-    match_is = np.array([labels.judge(np.full(len(every), query), every) for query in frame],
-                        np.str_).reshape(len(frame), len(every))
-    return FrameSample(frame, labels.kind[frame], match_is, labels.told_by)
-
-
-def sample_pairs(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:
-    """
-    Draw loops, and as many pairs of different places (``pairs.draw_pairs``).
-
-    Parameters
-    ----------
-    labels : FrameLabels
-        Of the stream.
-    per_kind : int
-        Pairs of each kind.
-    seed : int
-        Of the cell.
-
-    """
-    query, kind, reference = draw_pairs(labels.relation, per_kind, seed)
-    match_is = np.full((len(query), len(labels.kind)), UNTOLD, f'<U{len(ELSEWHERE)}')
-    match_is[np.arange(len(query)), reference] = np.where(kind == POSITIVE, RIGHT, ELSEWHERE)
-    return FrameSample(query, kind, match_is, labels.told_by, reference)
-
-
-SAMPLES: Mapping[str, Callable[[FrameLabels, int, int], FrameSample]] = {
-    'frames': sample_frames, 'pairs': sample_pairs}
 
 
 def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: Sequence[Cell],
@@ -235,6 +162,9 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     detectors: dict[LcdConfig, LoopClosureDetector] = {}
     kind_of_detector = LoopClosureDetector if sample.reference is None else PairDetector
     contests = [_contest(cell, lcd, seed, detectors, kind_of_detector) for cell in cells]
+    wire = SealedWire() if any(cell.sealed for cell in cells) else None
+    for cell, contest in zip(cells, contests, strict=True):
+        contest.wire = wire if cell.sealed else None
     place = {int(frame): row for row, frame in enumerate(sample.frame)}
     index_of = {graph.stamp_ns: index for index, graph in enumerate(graphs)}
     for index, graph in enumerate(graphs[:max(place, default=-1) + 1]):
@@ -247,6 +177,8 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
                 contest.results.append(_attack_frame(
                     contest, graph, clean[contest.judging.config], int(sample.kind[row]),
                     sample.match_is[row], index_of))
+        if wire is not None:
+            wire.carry(graph)
         for detector in detectors.values():
             detector.remember(graph)
         for contest in contests:
@@ -273,9 +205,16 @@ def _contest(cell: Cell, lcd: LcdConfig, seed: int,
             detectors[config] = make(config)
     judging, asked = (detectors[config] for config in configs)
     attack = replace(cell.attack, seed=seed)
-    adversary: _Adversary = (_Yardstick(Optimum(judging if cell.aware else asked, attack))
-                             if cell.search == Optimum.name else Attacker(attack))
-    return _Contest(adversary, asked, judging)
+    return _Contest(_adversary(cell, attack, judging, asked), asked, judging)
+
+
+def _adversary(cell: Cell, attack: AttackConfig, judging: LoopClosureDetector,
+               asked: LoopClosureDetector) -> _Adversary:
+    if cell.sealed and cell.aware:
+        return _Resigned()
+    if cell.search == Optimum.name:
+        return _Yardstick(Optimum(judging if cell.aware else asked, attack))
+    return Attacker(attack)
 
 
 def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, kind: int,
@@ -284,12 +223,32 @@ def _attack_frame(contest: _Contest, graph: MultiTierGraph, clean: LoopClosure, 
     begun = time.thread_time()
     result = contest.adversary.attack(graph, ask)
     attacked = time.thread_time()
-    after = contest.judging.judge(result.perturbed)
+    arrived, refused = _arrived(contest, result)
+    after = _undecided(graph) if arrived is None else contest.judging.judge(arrived)
+    judged = time.thread_time()
     _check_budgets(result, ask.count)
     return FrameResult(
         kind, clean, after, _said_of(clean, match_is, index_of),
         _said_of(after, match_is, index_of), result, ask.spent_s,
-        attacked - begun - ask.spent_s, time.thread_time() - attacked)
+        attacked - begun - ask.spent_s, judged - attacked,
+        _unexplained(contest, graph), _unexplained(contest, arrived), refused)
+
+
+def _arrived(contest: _Contest, result: AttackResult) -> tuple[MultiTierGraph | None, str]:
+    """Return what the detector gets of an attacked graph, or why it refuses it."""
+    if contest.wire is None:
+        return result.perturbed, ''
+    return contest.wire.arrives(result.clean, result.perturbed)
+
+
+def _undecided(graph: MultiTierGraph) -> LoopClosure:
+    return LoopClosure(graph.stamp_ns, graph.frame_id, graph.sequence, is_loop=False,
+                       probability=0.0)
+
+
+def _unexplained(contest: _Contest, graph: MultiTierGraph | None) -> int | None:
+    scoring = contest.judging.judging.scoring
+    return scoring.unexplained(graph) if graph is not None and scoring.counts_edges else None
 
 
 def _said_of(decision: LoopClosure, match_is: NDArray[np.str_], index_of: dict[int, int]) -> str:

@@ -25,16 +25,18 @@ from adversarial_lcd_ros.evaluation.digests import file_digest
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, attack_columns, method_of
 from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.lcd.targets import decision_path, needed_variant
-from adversarial_lcd_ros.registry import YARDSTICKS
+from adversarial_lcd_ros.registry import SEARCHES, YARDSTICKS
 
 # Of the row's columns; a change in the code below runs cells again by itself.
-SCHEMA = 6
+SCHEMA = 7
 # What makes the figures of a row.
 _CODE = ('attack', 'lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled',
          'messages', 'evaluation/metrics', 'evaluation/frames/attacked',
-         'evaluation/frames/optimum', 'evaluation/frames/pairs', 'evaluation/frames/rows')
+         'evaluation/frames/optimum', 'evaluation/frames/pairs', 'evaluation/frames/rows',
+         'evaluation/frames/samples', 'evaluation/frames/sealed')
 ORACLES = ('soft', 'hard')
 JUDGED = ('frames', 'pairs')
+SEALED = 'sealed graphs'
 # Attack settings that have columns of their own.
 _COLUMNS = ('mode', *COLUMNS, 'ratio', 'edits', 'queries_per_edit', 'seed')
 # Files count by their content.
@@ -75,7 +77,10 @@ class Cell:
     detector : tuple of (str, value)
         Other settings of the detector that are not those of the experiment: its defences.
     aware : bool
-        The detector that answers queries has them, too; else it has those of the experiment.
+        The detector that answers queries has them, too; else it has those of the experiment. Of
+        sealed graphs: the attacker knows that whatever he changes is refused, and changes none.
+    sealed : bool
+        Builder and detector share a key, and the attacker has none.
 
     """
 
@@ -93,6 +98,7 @@ class Cell:
     judged: str = JUDGED[0]
     detector: tuple[tuple[str, Any], ...] = ()
     aware: bool = True
+    sealed: bool = False
 
     @property
     def method(self) -> str:
@@ -111,10 +117,16 @@ class Cell:
         return attack_columns(self.attack)
 
     @property
+    def _moved(self) -> str:
+        used = () if self.search in YARDSTICKS else SEARCHES.find(self.search).own_settings
+        return self.attack.moved if 'moved' in used else ''
+
+    @property
     def variant(self) -> str:
         """Settings without a column of their own that are not the usual ones."""
         behind = ', '.join(f'{name} {value}' for name, value in self.detector)
         return ', '.join(filter(None, (self.attack.changed(*_COLUMNS, *_FILES), behind,
+                                       SEALED if self.sealed else '',
                                        '' if self.aware else 'unaware', self.conditions)))
 
     @property
@@ -125,7 +137,8 @@ class Cell:
                 'edits': self.attack.edits, 'queries_per_edit': self.attack.queries_per_edit,
                 'nodes': self.nodes, 'threshold': self.threshold, 'judged': self.judged,
                 'detector': ', '.join(f'{name} {value}' for name, value in self.detector),
-                'aware': self.aware, 'variant': self.variant}
+                'aware': self.aware, 'sealed': self.sealed, 'moved': self._moved,
+                'variant': self.variant}
 
 
 def cell_key(cell: Cell, seed: int, stream: str, lcd: LcdConfig) -> str:

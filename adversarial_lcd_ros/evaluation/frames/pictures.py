@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.frames.attacked import (
-    SAMPLES,
-    FrameResult,
-    attack_frames,
-)
+from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult, attack_frames
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.metrics import EFFECTS
 from adversarial_lcd_ros.evaluation.pictures import Picture

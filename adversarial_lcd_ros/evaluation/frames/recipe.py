@@ -15,7 +15,8 @@ Recipes of evaluations by frames: attacks with their defaults, and axes that are
 A setting with a list is an axis: this recipe has four attacks. An attack may say which ``part``
 of the recipe it is, and parts can be run alone. ``detector`` holds settings of the detector by
 name, such as ``{defences: geometric_check}``: attack and defence are chosen apart. Beside the
-settings of the attacker an attack has those of ``CellConfig``; its search may be a yardstick.
+settings of the attacker an attack has those of ``CellConfig``; its search may be a yardstick. A
+name may say settings of the attack, as in ``{name: '{nodes_moved} nodes', nodes_moved: [5, 9]}``.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import asdict, dataclass, fields
 from itertools import product
 import math
 from pathlib import Path
+import re
 from typing import Any, ClassVar
 
 from adversarial_lcd_ros.config import (
@@ -46,6 +48,7 @@ _FLOATS = tuple(entry.name for entry in fields(AttackConfig) if isinstance(entry
 MAX_CELLS = 10_000
 MAX_RUNS = 1_000_000
 DETECTOR = 'detector'
+_PLACE = re.compile(r'\{(\w+)\}')
 _TOP = ('protocol', 'seeds', 'frames', 'defaults', 'labels', 'attacks')
 
 
@@ -70,6 +73,9 @@ class CellConfig(Config):
         'one given reference and its window, half of them loops.', choices=JUDGED)
     aware: bool = setting(
         True, 'The detector that answers queries has the defences of the one attacked.')
+    sealed: bool = setting(
+        False, 'Builder and detector share a key (parameter key of their nodes). Who is aware of '
+        'it changes nothing; what others send is refused, and counted.')
     nodes: int = setting(BuilderConfig.features, 'Features of a graph.', low=8, high=5000)
     frames: int = setting(
         6, 'Frames with a loop, and as many at new places, for each seed; or pairs of each kind.',
@@ -202,6 +208,7 @@ def _multiplied(path: Path, values: Mapping[str, Any]) -> Iterator[dict[str, Any
 
 def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     own_names = {entry.name for entry in fields(CellConfig)}
+    values = {**values, 'name': _filled(path, values)} if 'name' in values else values
     detector = _detector(path, values.get(DETECTOR))
     values = {name: value for name, value in values.items() if name != DETECTOR}
     attack = {name: _number(value) if name in _FLOATS else value
@@ -221,6 +228,16 @@ def _cell(path: Path, values: Mapping[str, Any]) -> Cell:
     known = asdict(own)
     return Cell(search, config, **{**known, 'asked_target': own.asked_target or own.target},
                 detector=detector)
+
+
+def _filled(path: Path, values: Mapping[str, Any]) -> str:
+    """Return the name of an attack, with the settings that it names in their places."""
+    name = str(values['name'])
+    unknown = [found for found in _PLACE.findall(name) if found not in values]
+    if unknown:
+        raise ConfigError(f'recipe {path}, name {name!r}: {", ".join(unknown)} is no setting of '
+                          'the attack: expected those that stand beside the name')
+    return _PLACE.sub(lambda found: f'{values[found[1]]}', name)
 
 
 def _detector(path: Path, values: Any) -> tuple[tuple[str, Any], ...]:

@@ -21,14 +21,16 @@ _TRACE_POINTS = 8
 _TEXT, _NUMBER, _FIGURE = (str,), (int, float), (int, float, type(None))
 ROW_COLUMNS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(('sequence', 'target', 'asked_target', 'perturbation', 'surrogate', 'oracle',
-                     'mode', 'edits', 'judged', 'variant', 'name', 'versions'), _TEXT),
+                     'mode', 'edits', 'judged', 'variant', 'name', 'versions', 'moved'), _TEXT),
+    'sealed': (bool,),
     **dict.fromkeys(('ratio', 'queries_per_edit', 'nodes', 'threshold', 'seed', 'frames',
                      'positives', 'negatives', 'suppressed', 'invented', 'left_out',
-                     'invented_elsewhere', 'unattackable',
+                     'invented_elsewhere', 'unattackable', 'refused',
                      'duration_s', 'query_s', 'search_s', 'judge_s'), _NUMBER),
     **dict.fromkeys(('nodes_mean', 'edges_mean', 'accuracy_clean', 'accuracy_attacked',
                      'balanced_clean', 'balanced_attacked', 'decline_pp', 'edits_mean',
-                     'nodes_moved_mean', 'queries_mean', 'success_rate'), _FIGURE),
+                     'nodes_moved_mean', 'queries_mean', 'success_rate',
+                     'unexplained_clean_mean', 'unexplained_mean'), _FIGURE),
     'frame_results': (list,)}
 _FRAME_COLUMNS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(('stamp', 'kind', 'edits', 'queries', 'edit_budget', 'nodes_moved',
@@ -78,7 +80,9 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'edits_mean': _mean([attack.change.edits for attack in attacks]),
         'nodes_moved_mean': _mean([attack.change.nodes for attack in attacks]),
         'queries_mean': _mean([attack.queries for attack in attacks]),
-        'success_rate': _mean(turned),
+        'success_rate': _mean(turned), 'refused': sum(result.refused != '' for result in results),
+        'unexplained_clean_mean': _counted(results, 'unexplained_clean'),
+        'unexplained_mean': _counted(results, 'unexplained'),
         'frame_results': [_frame(*entry) for entry in zip(results, before, after, strict=True)],
         'duration_s': sum(seconds.values()), **seconds}
 
@@ -106,6 +110,12 @@ def _mean(values: Sequence[float] | NDArray[Any]) -> float | None:
     return float(np.mean(values)) if len(values) else None
 
 
+def _counted(results: Sequence[FrameResult], name: str) -> float | None:
+    """Return a mean over the frames on which it was counted."""
+    found = (getattr(result, name) for result in results)
+    return _mean([count for count in found if count is not None])
+
+
 def _frame(result: FrameResult, before: str, after: str) -> dict[str, Any]:
     attack = result.result
     last = len(attack.trace) - 1
@@ -114,7 +124,9 @@ def _frame(result: FrameResult, before: str, after: str) -> dict[str, Any]:
             'attacked': str(after), 'attacked_is': result.attacked_is,
             'edit_budget': attack.edit_budget, 'edits': attack.change.edits,
             'node_budget': attack.node_budget, 'nodes_moved': attack.change.nodes,
-            'queries': attack.queries, 'status': attack.status, 'reason': attack.reason,
+            'unexplained_clean': result.unexplained_clean, 'unexplained': result.unexplained,
+            'refused': result.refused, 'queries': attack.queries,
+            'status': attack.status, 'reason': attack.reason,
             'loss_before': round(attack.loss_before, 4),
             'loss_after': round(attack.loss_after, 4),
             'trace': [round(attack.trace[place], 4) for place in shown if place <= last]}

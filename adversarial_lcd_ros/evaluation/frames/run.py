@@ -26,13 +26,10 @@ from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.environment import environment
 from adversarial_lcd_ros.errors import EvaluationError
-from adversarial_lcd_ros.evaluation.frames.attacked import (
-    SAMPLES,
-    FrameSample,
-    attack_frames,
-)
+from adversarial_lcd_ros.evaluation.frames.attacked import attack_frames
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, cell_key
 from adversarial_lcd_ros.evaluation.frames.rows import ROW_COLUMNS, are_frames, make_row
+from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES, FrameSample
 from adversarial_lcd_ros.evaluation.methods import method_of
 from adversarial_lcd_ros.evaluation.store import CellStore, Row
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation.frames.attacked import SAMPLES
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector
 from adversarial_lcd_ros.evaluation.frames.run import FIRST_SEED
+from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.graph import MultiTierGraph

@@ -58,15 +58,16 @@ class RingsResults(ResultsKind):
                                   'evaluation again') from error
 
     def tables(self, results: Results) -> list[FigureTable]:
-        """Return the declines, by sequence."""
-        return [FigureTable(f'Decline in balanced accuracy on {sequence}', [{
+        """Return the declines, by sequence and target."""
+        return [FigureTable(f'Decline in balanced accuracy on {sequence}, {target}', [{
             'attack': row['attack'], 'defence': row['defence'],
             'balanced accuracy': f'{wording.percent(row["balanced_clean"])} → '
                                  f'{wording.percent(row["balanced_attacked"])}',
             'decline, points': wording.points(row['decline_pp']),
             '95 % interval': wording.interval(row['ci95']) or wording.UNDEFINED}
-            for row in results.rows if row['sequence'] == sequence])
-            for sequence in dict.fromkeys(row['sequence'] for row in results.rows)]
+            for row in results.rows if (row['sequence'], row['target']) == (sequence, target)])
+            for sequence, target in dict.fromkeys((row['sequence'], row['target'])
+                                                  for row in results.rows)]
 
     def figures(self, results: Results) -> list[Figure]:
         """Return the figures of every attack beside every defence."""

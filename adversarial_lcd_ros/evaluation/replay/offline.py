@@ -20,7 +20,8 @@ from adversarial_lcd_ros.sequences.sequence import Progress
 def run_offline(graphs: Sequence[MultiTierGraph], lcd: LcdConfig,
                 attack: AttackConfig | None = None,
                 progress: Progress | None = None, *,
-                asked: LcdConfig | None = None) -> tuple[AttackRun, list[MultiTierGraph]]:
+                asked: LcdConfig | None = None, sealed: bool = False
+                ) -> tuple[AttackRun, list[MultiTierGraph]]:
     """
     Return decisions and reports on a stream, and the graphs as the detector got them.
 
@@ -36,6 +37,9 @@ def run_offline(graphs: Sequence[MultiTierGraph], lcd: LcdConfig,
     asked : LcdConfig, optional
         Transfer: the detector that answers the attacker's queries, where it is not the one that
         is judged. It stores the same graphs. A report's loss and status are about its answers.
+    sealed : bool
+        The builder seals graphs: those that were changed are refused, neither judged nor stored,
+        and there is no decision on them.
 
     """
     detector = LoopClosureDetector(lcd)
@@ -50,9 +54,10 @@ def run_offline(graphs: Sequence[MultiTierGraph], lcd: LcdConfig,
             result = attacker.process(clean, lambda g: oracle.answer(LcdQuery(0, g)))
             reports.append(result.report(time.perf_counter() - started))
             graph = result.perturbed
-        decisions.append(detector.detect(graph))
-        if shadow:
-            shadow.detect(graph)
+        if not sealed or graph is clean:
+            decisions.append(detector.detect(graph))
+            if shadow:
+                shadow.detect(graph)
         forwarded.append(graph)
         if progress:
             progress(done + 1, len(graphs))

@@ -41,13 +41,15 @@ class Setup:
     Settings of the nodes.
 
     Without an attack, ``lcd`` listens to ``graph_builder``. Without a builder, the bag holds
-    the clean graphs of an earlier replay.
+    the clean graphs of an earlier replay. With the file of a key, the builder seals graphs, and
+    ``lcd`` takes no others, however long ago those of a bag were sealed.
     """
 
     builder: BuilderConfig | None
     lcd: LcdConfig
     replay: ReplayConfig
     attack: AttackConfig | None = None
+    key: str = ''
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Recording:
     clean, forwarded : list of MultiTierGraph
         As built, and as the detector got them; the same list without an attack.
     decisions : list of LoopClosure
+        Under a key there is none on a graph that was refused.
     reports : list of AttackReport
         Empty without an attack.
 
@@ -119,13 +122,15 @@ def run_pipeline(bag: Path, setup: Setup, folder: Path, domain: int,
 
 
 def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
-    sections = {'lcd': asdict(setup.lcd),
-                'bag_replay': {**asdict(setup.replay), 'bag': str(bag.resolve()),
+    key = {'key': str(Path(setup.key).resolve())} if setup.key else {}
+    age = {'max_age_s': 0.0} if setup.key and not setup.builder else {}
+    sections = {'lcd': {**asdict(setup.lcd), **key, **age},
+                'bag_replay': {**asdict(setup.replay), **key, 'bag': str(bag.resolve()),
                                'record': str(recording.resolve()),
                                # They are in the bag; the next attack starts from the graphs.
                                'record_frames': False}}
     if setup.builder:
-        sections['graph_builder'] = asdict(setup.builder)
+        sections['graph_builder'] = {**asdict(setup.builder), **key}
     if setup.attack:
         sections['attacker'] = asdict(setup.attack)
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}

@@ -24,6 +24,7 @@ from adversarial_lcd_ros.evaluation.replay.records import CLEAN, AttackRun, make
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
+from adversarial_lcd_ros.evaluation.replay.unexplained import unexplained_edges
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
@@ -198,7 +199,8 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
              if sequence.trajectory is None else
              label_graphs(run.clean, sequence.trajectory, sequence.source, labels))
     records = make_records(found, clean, {RECORDED: AttackRun(run.decisions, run.reports)})
-    records = ask_check(records, {CLEAN: run.clean, RECORDED: run.forwarded}, lcd)
+    sent = {CLEAN: run.clean, RECORDED: run.forwarded}
+    records = ask_check(records, sent, lcd)
     if not heard.has_reports:
         records = [replace(record, status=None, edit_budget=None, node_budget=None,
                            query_budget=None, queries=None,
@@ -208,6 +210,7 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
         [graph.node_count for graph in run.clean], [graph.edge_count for graph in run.clean]),
         seed, lcd, told_by=found.told_by)
     summary['notes'] = notes
+    summary['unexplained_edges'] = unexplained_edges(sent, lcd)
     summary['duration_s'] = time.monotonic() - started_s
     folder = ResultsFolder.create(output)
     folder.write_setup([lcd, labels], command_line, seed, {'source': str(bag.resolve())})

@@ -52,6 +52,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
+from adversarial_lcd_ros.evaluation.replay.unexplained import unexplained_edges
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
     finished_in_s,
@@ -181,12 +182,13 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
     labels = _labels(sequence, clean, plan)
     records = make_records(labels, clean.decisions, {
         name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
-    records = ask_check(records, {CLEAN: clean.clean, **{
-        name: run.forwarded for name, run in runs.items()}}, plan.lcd)
+    sent = {CLEAN: clean.clean, **{name: run.forwarded for name, run in runs.items()}}
+    records = ask_check(records, sent, plan.lcd)
     summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
         [graph.node_count for graph in clean.clean],
         [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd,
         told_by=labels.told_by)
+    summary['unexplained_edges'] = unexplained_edges(sent, plan.lcd)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()}
     if plan.sweep_labels and sequence.trajectory:

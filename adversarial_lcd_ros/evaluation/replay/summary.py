@@ -135,9 +135,9 @@ def _behind_check(attacks: Mapping[str, AttackConfig | None], clean: Sequence[Qu
         return None
     before = behind_check(clean)
     behind = {name: behind_check(run) for name, run in runs.items()}
-    rows = [{'name': name, **run_metrics(run).as_dict(), **_lost(before, run, block, seed)}
+    rows = [{'name': name, **asdict(run_metrics(run)), **_lost(before, run, block, seed)}
             for name, run in behind.items()]
-    return {'clean': run_metrics(before).as_dict(), 'attacks': rows}
+    return {'clean': asdict(run_metrics(before)), 'attacks': rows}
 
 
 def _lost(clean: Sequence[QueryRecord], run: Sequence[QueryRecord], block: int,
@@ -196,7 +196,7 @@ def run_metrics(run: Sequence[QueryRecord]) -> Metrics:
 def _run_figures(run: Sequence[QueryRecord], block: int, seed: int) -> dict[str, Any]:
     kind, outcome = column(run, 'label'), column(run, 'outcome')
     return {
-        **run_metrics(run).as_dict(),
+        **asdict(run_metrics(run)),
         'loops_declared': sum(record.is_loop for record in run),
         'balanced_accuracy_ci95': intervals.balanced_accuracy_interval(
             told_kind(kind, outcome), right(outcome), block, seed),

@@ -14,16 +14,25 @@ from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS, NODES, Summar
 
 _NOTES = """\
 Clean and attacked are balanced accuracies, decline is their difference in points, with the 95 %
-interval of a bootstrap over frames. A map of clean graphs, the detector `wl` unless said
-otherwise, every attacker asks the detector with its defences unless it is called unaware.
+interval of a bootstrap over frames. A map of clean graphs; every attacker asks the detector with
+its defences unless it is called unaware.
 Suppressed: loops that had been found and were lost. Invented: loops at new places that had been
 left alone; in brackets those that certainly name another place. The optimum is a yardstick that
-looks into the detector."""
+looks into the detector. Unexplained: edges that a defence cannot explain by the nodes, mean of
+clean and of attacked graphs, where the detector counts them."""
+_SEALED = """\
+Sealed graphs: builder and detector share a key. Who knows of it sends graphs as they are: nothing
+is lost. What others send is refused, counted by cause, and decides nothing: new places are left
+alone, **and loops are lost**, with an alarm for each. Cutting the wire, or holding graphs back,
+loses them as well and is measured nowhere on this page, since nothing stops it; graphs that were
+held back are counted as missing."""
 _WORST = """\
 Worst case as RobustBench counts it: a frame is held only if every attack of the column, and of
-those left of it, fails on it, so each figure is below that of any single attack. Price: median
-processor time that a decision on a clean graph takes more than without the defence, on the
-machine of the run, whatever else it did."""
+those left of it, fails on it, so each figure is below that of any single attack. A graph that is
+refused decides nothing, so its loop counts as lost; the second figure takes a refusal for an
+attack that failed. Price: median processor time that a decision on a clean graph takes more than
+without the defence, for sealed graphs that of sealing and opening one, on the machine of the run,
+whatever else it did."""
 _POSTERS = """\
 Of so many pairs of places that certainly differ, in how many a loop with the poster's frames was
 declared. Controls: no poster, and another poster of the kind in the later place; of these, all
@@ -36,12 +45,16 @@ def rings_page(summary: Mapping[str, Any], command: str = '') -> str:
     rows: list[Summary] = summary['rows']
     parts = [f'Made by `{command}`.\n' if command else '',
              '# The rings: attacks beside defences\n', _NOTES,
-             '\n## Leaderboard of the defences\n', _WORST, '',
-             *_leaderboard(summary['worst'], summary['prices'], rows)]
-    for sequence in dict.fromkeys(row['sequence'] for row in rows):
-        here = [row for row in rows if row['sequence'] == sequence]
-        parts += [f'\n## {sequence}: decline in points\n', *_matrix(here),
-                  f'\n### {sequence}: each attack\n', *_details(here)]
+             *(['', _SEALED] if any(row.get('sealed') for row in rows) else []),
+             '\n## Leaderboard of the defences\n', _WORST]
+    for target in dict.fromkeys(row['target'] for row in rows):
+        parts += [f'\n### Target {target}\n', *_leaderboard(
+            *([entry for entry in summary[name] if entry.get('target', target) == target]
+              for name in ('worst', 'prices', 'rows')))]
+    for target, sequence in dict.fromkeys((row['target'], row['sequence']) for row in rows):
+        here = [row for row in rows if (row['target'], row['sequence']) == (target, sequence)]
+        parts += [f'\n## {sequence}, {target}: decline in points\n', *_matrix(here),
+                  f'\n### {sequence}, {target}: each attack\n', *_details(here)]
     if summary['posters']:
         parts += ['\n## A poster in two places\n', _POSTERS, '', *_posters(summary['posters'])]
     return '\n'.join(parts).lstrip('\n') + '\n'
@@ -77,7 +90,9 @@ def _worst(entry: Summary | None) -> str:
     bounds = wording.interval(entry['ci95'], 100.0)
     held = wording.percent(entry['balanced'])
     attacks = f'{entry["attacks"]} attack{"s" if entry["attacks"] > 1 else ""}'
-    return f'{held} ({bounds}; {attacks})' if bounds else held
+    refused = entry.get('balanced_or_refused')
+    or_refused = '' if refused is None else f', or refused {wording.percent(refused)}'
+    return f'{held} ({bounds}; {attacks}){or_refused}' if bounds else f'{held}{or_refused}'
 
 
 def _matrix(rows: Sequence[Summary]) -> list[str]:
@@ -99,20 +114,31 @@ def _decline(row: Summary | None) -> str:
     if row is None:
         return ''
     bounds = wording.interval(row['ci95'])
-    return wording.points(row['decline_pp']) + (f' ({bounds})' if bounds else '')
+    refused = sum(row.get('refused', {}).values())
+    return (wording.points(row['decline_pp']) + (f' ({bounds})' if bounds else '')
+            + (f', {refused} refused' if refused else ''))
 
 
 def _details(rows: Sequence[Summary]) -> list[str]:
     return table(
         ['attack', 'defence', 'clean → attacked', 'suppressed', 'invented', 'edits', 'nodes',
-         'queries'],
+         'queries', 'unexplained', 'refused'],
         [[_title(row), row['defence'],
           f'{wording.percent(row["balanced_clean"])} → '
           f'{wording.percent(row["balanced_attacked"])}',
           f'{row["suppressed"]} of {row["found_clean"]}',
           f'{row["invented"]} of {row["silent_clean"]} ({row["invented_elsewhere"]})',
           wording.mean_count(row['edits_mean']), wording.mean_count(row['nodes_moved_mean']),
-          wording.mean_count(row['queries_mean'])] for row in rows])
+          wording.mean_count(row['queries_mean']), _unexplained(row), ', '.join(
+              f'{cause} {count}' for cause, count in row.get('refused', {}).items())]
+         for row in rows])
+
+
+def _unexplained(row: Summary) -> str:
+    clean, attacked = (row.get(f'{name}_mean') for name in ('unexplained_clean', 'unexplained'))
+    if clean is None or attacked is None:
+        return ''
+    return f'{wording.mean_count(clean)} → {wording.mean_count(attacked)}'
 
 
 def _posters(rows: Sequence[Summary]) -> list[str]:

@@ -43,9 +43,12 @@ def ring_pictures(streams: Sequence[Stream], cells: Sequence[Cell], rows: Sequen
     """
     pictures = []
     for ring in (FLIPS, NODES):
-        here = [cell for cell in cells if ring_of({'search': cell.search}) == ring]
-        pictures += attacked_pictures(streams, here, [row for row in rows if ring_of(row) == ring],
-                                      lcd, EACH) if here else []
+        # Where graphs were refused the detector saw none.
+        here = [cell for cell in cells
+                if ring_of({'search': cell.search}) == ring and not cell.sealed]
+        pictures += attacked_pictures(streams, here, [
+            row for row in rows if ring_of(row) == ring and not row['sealed']
+        ], lcd, EACH) if here else []
     return pictures + _posters(posters, tasks)
 
 

@@ -10,8 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, GRID, STYLE, attack_colour, svg
 from adversarial_lcd_ros.evaluation.rings.scene import SAME
 from adversarial_lcd_ros.evaluation.rings.summaries import FLIPS, Summary
@@ -38,10 +40,13 @@ def ring_curves(summary: Mapping[str, Any]) -> bytes:
                 for number, title in enumerate(titles):
                     line = lines.get((sequence, title), {})
                     at = sorted(line)
+                    # Ever thinner: where lines are one, those beneath are seen beside it.
                     axes.plot(at, [line[place] for place in at], marker='o', markersize=4,
                               color=attack_colour(number), label=title,
+                              linewidth=max(1.0, 3.6 - 0.4 * number),
                               linestyle='-' if number < len(ATTACK_COLOURS) else '--')
                 axes.set(xlabel=what, ylabel=value)
+                _mark_places(axes, {place for line in lines.values() for place in line})
                 axes.set_title(sequence, loc='left', fontsize=9.0)
                 axes.grid(axis='y', color=GRID, linewidth=0.6)
             panels[-1].axis('off')
@@ -51,14 +56,28 @@ def ring_curves(summary: Mapping[str, Any]) -> bytes:
         return svg(figure)
 
 
+def _mark_places(axes: Axes, places: set[float]) -> None:
+    """Put every place on the axis; they about double from one to the next."""
+    shown: list[float] = []
+    for place in sorted(places):
+        # The size of a whole graph is not the same on every sequence.
+        if not shown or place > 1.2 * shown[-1]:
+            shown.append(place)
+    if shown:
+        axes.set_xscale('log')
+        axes.set_xticks(shown, [f'{place:.3g}' for place in shown])
+        axes.minorticks_off()
+
+
 def _over(rows: Sequence[Summary], what: str, kind: str) -> Lines:
     lines: Lines = defaultdict(dict)
     for row in rows:
         is_there = row['ring'] == FLIPS if kind == FLIPS else row['search'] == kind
-        if is_there and row['decline_pp'] is not None:
+        if is_there and row['decline_pp'] is not None and not row.get('sealed'):
             place = row['ratio'] if what == 'ratio' else row['node_budget_mean']
-            name = row['attack'] if what == 'ratio' else row['search']
-            lines[row['sequence'], f'{name}, {row["defence"]}'][place] = row['decline_pp']
+            name = row['attack'] if what == 'ratio' else row.get('moved') or row['search']
+            of = '' if row['target'] == LcdConfig.target else f'{row["target"]}, '
+            lines[row['sequence'], f'{of}{name}: {row["defence"]}'][place] = row['decline_pp']
     return {title: line for title, line in lines.items() if len(line) > 1}
 
 
@@ -67,6 +86,6 @@ def _posters(rows: Sequence[Summary]) -> Lines:
     for row in rows:
         if row['control'] == SAME and row['count'] == 1 and row['kind'] == 'cells' and (
                 row['target'] == 'wl'):
-            lines[row['sequence'], f'{row["target"]}, {row["check"]}'][row['share']] = (
+            lines[row['sequence'], f'{row["target"]}: {row["check"]}'][row['share']] = (
                 row['to_poster'] / row['pairs'])
     return {title: line for title, line in lines.items() if len(line) > 1}

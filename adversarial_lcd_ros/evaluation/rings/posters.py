@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 import itertools
 from pathlib import Path
 from typing import Any, ClassVar
@@ -25,15 +26,23 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from adversarial_lcd_ros.config import POSTERS, Config, LabelConfig, LcdConfig, setting
+from adversarial_lcd_ros.config import (
+    POSTERS,
+    BuilderConfig,
+    Config,
+    LabelConfig,
+    LcdConfig,
+    setting,
+)
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, Condition, Scene
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
+from adversarial_lcd_ros.lcd.targets import builder_for
 from adversarial_lcd_ros.registry import NONE, TARGETS
-from adversarial_lcd_ros.vision.builder import GraphBuilder
+from adversarial_lcd_ros.vision.builder import GraphBuilder, in_variant
 
 Row = dict[str, Any]
 Checks = tuple[tuple[str, LcdConfig], ...]
@@ -66,6 +75,8 @@ class PairTask:
     sequence : str
         Name.
     graphs : GraphSource
+    builder : BuilderConfig
+        Of the graphs that targets get which take any; others get the variant that they need.
     earlier, later : int
         Frames of the stream.
     elsewhere : bool, (n,)
@@ -84,6 +95,7 @@ class PairTask:
 
     sequence: str
     graphs: GraphSource
+    builder: BuilderConfig
     earlier: int
     later: int
     elsewhere: NDArray[np.bool_]
@@ -118,6 +130,14 @@ def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(',')]
 
 
+def poster_streams(streams: Sequence[Stream]) -> list[Stream]:
+    """Return one stream of each sequence: as no target asked for it if there is, the largest."""
+    chosen: dict[str, Stream] = {}
+    for stream in sorted(streams, key=lambda stream: (not stream.variant, stream.nodes)):
+        chosen[stream.name] = stream
+    return [chosen[name] for name in dict.fromkeys(stream.name for stream in streams)]
+
+
 def poster_tasks(stream: Stream, config: PosterConfig, lcd: LcdConfig,
                  checks: Sequence[tuple[str, LcdConfig]], labels: LabelConfig) -> list[PairTask]:
     """
@@ -133,6 +153,9 @@ def poster_tasks(stream: Stream, config: PosterConfig, lcd: LcdConfig,
     """
     if stream.graphs.builder.detector == 'csv':
         raise ConfigError(f'{stream.name} has no pictures to paste a poster into')
+    builder = stream.graphs.builder
+    if stream.variant:
+        builder = replace(builder, graph_variant=BuilderConfig.graph_variant)
     rng = np.random.default_rng(config.seed)
     known, tasks = stream.labels, list[PairTask]()
     for later in rng.permutation(len(known.kind)).tolist():
@@ -141,7 +164,7 @@ def poster_tasks(stream: Stream, config: PosterConfig, lcd: LcdConfig,
         if near.any():
             earlier = int(rng.choice(np.flatnonzero(near))) + 1
             tasks.append(PairTask(
-                stream.name, stream.graphs, earlier, later, known.elsewhere[later],
+                stream.name, stream.graphs, builder, earlier, later, known.elsewhere[later],
                 tuple(conditions_of(config)), tuple(_names(config.targets)), tuple(checks), lcd,
                 labels.focal_length, config.seed + len(tasks)))
         if len(tasks) == config.pairs:
@@ -186,10 +209,13 @@ def _judged(task: PairTask, graphs: Sequence[MultiTierGraph],
     query = made[task.later]
     support: dict[tuple[str, int], float] = {}
     for target in task.targets:
+        builder = builder_for(task.builder, target)
+        suited = _clean_graphs(task.graphs, builder)
         detector = LoopClosureDetector(replace(task.lcd, target=target))
         for index in range(task.later):
-            detector.remember(made.get(index, graphs[index]))
-        decision = detector.judge(query)
+            detector.remember(in_variant(made[index], builder) if index in made
+                              else suited[index])
+        decision = detector.judge(in_variant(query, builder))
         match = (index_of[decision.match_stamp_ns] if decision.match_stamp_ns is not None
                  else None)
         for name, config in (('none', task.lcd), *task.checks):
@@ -203,6 +229,12 @@ def _judged(task: PairTask, graphs: Sequence[MultiTierGraph],
             yield {'target': target, 'check': name, 'declared': bool(stands),
                    'to_poster': bool(stands and match in made),
                    'elsewhere': bool(stands and match is not None and task.elsewhere[match])}
+
+
+@lru_cache(4)
+def _clean_graphs(source: GraphSource, builder: BuilderConfig) -> tuple[MultiTierGraph, ...]:
+    """Return the graphs of a source in the variant of some settings; the latest are kept."""
+    return tuple(in_variant(graph, builder) for graph in load_stream_graphs(source))
 
 
 def poster_config(values: Any, path: Path) -> tuple[PosterConfig, Checks]:

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from adversarial_lcd_ros.evaluation.rings.posters import (
     poster_tasks,
     run_pair,
 )
-from adversarial_lcd_ros.evaluation.rings.prices import decision_us
+from adversarial_lcd_ros.evaluation.rings.prices import decision_us, sealing_us
 from adversarial_lcd_ros.evaluation.rings.summaries import defence_title, summarise, worst_cases
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
@@ -33,6 +34,7 @@ from adversarial_lcd_ros.evaluation.workers import Run
 from adversarial_lcd_ros.files import reading
 from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.files.writing import write_bytes, write_json, write_text
+from adversarial_lcd_ros.graph import MultiTierGraph
 
 KIND, SCHEMA = 'rings', 1
 PAGE, CURVES, POSTERS = 'rings.md', 'rings.svg', 'posters.json'
@@ -95,16 +97,29 @@ def _finished(path: Path) -> list[Row]:
 def measured_prices(streams: Sequence[Stream], cells: Sequence[Cell],
                     lcd: LcdConfig) -> list[Row]:
     """Return what each defence of some cells costs on each sequence, in time of a decision."""
-    detectors = list(dict.fromkeys([(), *(cell.detector for cell in cells)]))
     rows: list[Row] = []
     for stream in streams:
-        spent = decision_us(load_stream_graphs(stream.graphs), lcd, detectors)
-        rows += [{'sequence': stream.name, 'decision_us': us, 'more_us': us - spent[0],
-                  'defence': defence_title({
-                      'detector': ', '.join(f'{name} {value}' for name, value in settings),
-                      'threshold': LcdConfig.threshold})}
-                 for settings, us in zip(detectors, spent, strict=True)]
+        graphs = load_stream_graphs(stream.graphs)
+        here = [cell for cell in cells
+                if (cell.nodes, cell.variant_needed) == (stream.nodes, stream.variant)]
+        for target in dict.fromkeys(cell.target for cell in here):
+            rows += [{'sequence': stream.name, 'target': target, **price} for price in
+                     _prices(graphs, [cell for cell in here if cell.target == target],
+                             replace(lcd, target=target))]
     return rows
+
+
+def _prices(graphs: Sequence[MultiTierGraph], cells: Sequence[Cell],
+            lcd: LcdConfig) -> Iterator[Row]:
+    detectors = list(dict.fromkeys([(), *(cell.detector for cell in cells)]))
+    spent = dict(zip(detectors, decision_us(graphs, lcd, detectors), strict=True))
+    sealing = sealing_us(graphs) if any(cell.sealed for cell in cells) else 0.0
+    for settings, sealed in dict.fromkeys([(settings, False) for settings in detectors] + [
+            (cell.detector, True) for cell in cells if cell.sealed]):
+        us = spent[settings] + sealing * sealed
+        yield {'decision_us': us, 'more_us': us - spent[()], 'defence': defence_title({
+            'detector': ', '.join(f'{name} {value}' for name, value in settings),
+            'threshold': LcdConfig.threshold, 'sealed': sealed})}
 
 
 def write_rings(folder: Path, rows: Sequence[Row], posters: Sequence[Row],

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation import metrics
+from adversarial_lcd_ros.evaluation.frames.cells import SEALED
 from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE
@@ -27,6 +28,8 @@ LEVELS = WITHIN_R, WITHIN_NODES, ANY = (
 Summary = dict[str, Any]
 _GROUP = ('sequence', 'target', 'detector', 'threshold', 'name', 'search', 'aware', 'ratio',
           'variant')
+# Of rows written before there was such a thing.
+_SINCE = {'sealed': False, 'moved': ''}
 
 
 def ring_of(row: Mapping[str, Any]) -> str:
@@ -39,6 +42,8 @@ def defence_title(row: Mapping[str, Any]) -> str:
     words = [row['detector'].removeprefix('defences ')] if row['detector'] else []
     if row['threshold'] != LcdConfig.threshold:
         words.append(f'threshold {row["threshold"]:g}')
+    if row.get('sealed'):
+        words.append(SEALED)
     return ', '.join(words) or 'none'
 
 
@@ -76,7 +81,8 @@ def _entry(rows: Sequence[Row], seed: int) -> Summary:
     stamps = [frame['stamp'] for frame in frames]
     lost = metrics.right(before).astype(np.int64) - metrics.right(after)
     return {
-        **{name: first[name] for name in _GROUP}, 'ring': ring_of(first),
+        **{name: first[name] for name in _GROUP},
+        **{name: first.get(name, usual) for name, usual in _SINCE.items()}, 'ring': ring_of(first),
         'attack': attack_name(first), 'defence': defence_title(first),
         'seeds': len(rows), 'frames': len(frames), 'different_frames': len(set(stamps)),
         'positives': int((kind == POSITIVE).sum()), 'negatives': int((kind == NEGATIVE).sum()),
@@ -93,7 +99,17 @@ def _entry(rows: Sequence[Row], seed: int) -> Summary:
         'edits_mean': _mean(frame['edits'] for frame in frames),
         'nodes_moved_mean': _mean(frame['nodes_moved'] for frame in frames),
         'node_budget_mean': _mean(frame['node_budget'] for frame in frames),
-        'queries_mean': _mean(frame['queries'] for frame in frames)}
+        'queries_mean': _mean(frame['queries'] for frame in frames),
+        **{f'{name}_mean': _counted(frames, name) for name in ('unexplained_clean',
+                                                               'unexplained')},
+        'refused': dict(sorted(Counter(
+            frame['refused'] for frame in frames if frame.get('refused')).items()))}
+
+
+def _counted(frames: Sequence[Mapping[str, Any]], name: str) -> float | None:
+    """Return a mean over the frames on which it was counted; None if it was on none."""
+    found = [frame[name] for frame in frames if frame.get(name) is not None]
+    return _mean(found) if found else None
 
 
 def worst_cases(rows: Sequence[Row], seed: int) -> list[Summary]:
@@ -101,7 +117,9 @@ def worst_cases(rows: Sequence[Row], seed: int) -> list[Summary]:
     Return for each defence and sequence what is left against the strongest attack on each frame.
 
     As RobustBench counts: a frame is held if every attack of the level fails on it. One entry for
-    each of LEVELS that has an attack of its own; a level holds those before it.
+    each of LEVELS that has an attack of its own; a level holds those before it. Where graphs were
+    refused, ``balanced_or_refused`` takes a refusal, which raises an alarm, for an attack that
+    failed; None elsewhere.
     """
     groups: dict[tuple[str, str, str], list[Row]] = defaultdict(list)
     for row in rows:
@@ -124,7 +142,7 @@ def _level_of(row: Row) -> str:
 
 
 def _worst(key: tuple[str, str, str], rows: Sequence[Row], level: str, seed: int) -> Summary:
-    held: dict[tuple[int, int], list[bool]] = defaultdict(list)
+    held: dict[tuple[int, int], list[tuple[bool, bool]]] = defaultdict(list)
     kinds: dict[tuple[int, int], int] = {}
     attacks = set()
     for row in rows:
@@ -133,16 +151,21 @@ def _worst(key: tuple[str, str, str], rows: Sequence[Row], level: str, seed: int
             if 'UM' not in (frame['clean'], frame['attacked']):
                 at = row['seed'], frame['stamp']
                 kinds[at] = frame['kind']
-                held[at].append(frame['attacked'] in ('TP', 'TN')
-                                and frame['clean'] in ('TP', 'TN'))
+                was, now = (frame[when] in ('TP', 'TN') for when in ('clean', 'attacked'))
+                held[at].append((was and now, was and (now or bool(frame.get('refused')))))
     kind = np.array([kinds[at] for at in held], np.int8)
-    right = np.array([all(each) for each in held.values()], np.int64)
-    rates = [right[kind == value] for value in (POSITIVE, NEGATIVE)]
+    right, unharmed = (np.array([all(each[way] for each in attacks) for attacks in held.values()],
+                                np.int64) for way in (0, 1))
+    refused = any(frame.get('refused') for row in rows for frame in row['frame_results'])
     return {'sequence': key[0], 'target': key[1], 'defence': key[2], 'level': level,
-            'attacks': len(attacks), 'frames': len(held),
-            'balanced': (float(np.mean([rate.mean() for rate in rates]))
-                         if all(map(len, rates)) else None),
+            'attacks': len(attacks), 'frames': len(held), 'balanced': _balanced(kind, right),
+            'balanced_or_refused': _balanced(kind, unharmed) if refused else None,
             'ci95': _interval([stamp for _, stamp in held], kind, right, seed)}
+
+
+def _balanced(kind: NDArray[np.int8], right: NDArray[np.int64]) -> float | None:
+    rates = [right[kind == value] for value in (POSITIVE, NEGATIVE)]
+    return float(np.mean([rate.mean() for rate in rates])) if all(map(len, rates)) else None
 
 
 def _interval(stamps: Sequence[int], kind: NDArray[np.int8], value: NDArray[np.int64],

@@ -36,11 +36,14 @@ class ObjectsTarget(Target):
         """Return the scores (objects, edges) of a query with every reference, shape (r, 2)."""
         objects, edges = np.zeros(len(nodes)), np.zeros(len(nodes))
         own = _object_edges(query.graph)
-        mine = _neighbourhood(query.graph, own)
+        classes = np.unique(np.concatenate([
+            view.graph.label[:view.objects] for view in (query, *nodes.references)]))
+        mine = _neighbourhood(query.graph, own, classes)
         for place, reference in enumerate(nodes.references):
             ends = _object_edges(reference.graph)
             rows, columns, alike = assign_objects(_alike(
-                query.graph, reference.graph, mine, _neighbourhood(reference.graph, ends)))
+                query.graph, reference.graph, mine,
+                _neighbourhood(reference.graph, ends, classes)))
             objects[place] = alike.sum()
             common = _common_edges(query.graph, reference.graph, own, rows, columns, alike)
             edges[place] = common / max((len(own) + len(ends)) / 2, 1)
@@ -52,14 +55,15 @@ def _object_edges(graph: MultiTierGraph) -> NDArray[np.int64]:
     return graph.edge[graph.edge[:, 1] < graph.object_count].astype(np.int64)
 
 
-def _neighbourhood(graph: MultiTierGraph, ends: NDArray[np.int64]) -> NDArray[np.float64]:
+def _neighbourhood(graph: MultiTierGraph, ends: NDArray[np.int64],
+                   classes: NDArray[np.uint32]) -> NDArray[np.float64]:
     """
     Return how much of each class is at and around each object, unit rows, (objects, classes).
 
     One continuous WL iteration on classes, weighted by exp(-length / reach).
     """
-    label = graph.label[:graph.object_count].astype(np.int64)
-    known = np.zeros((len(label), int(label.max(initial=-1)) + 1))
+    label = np.searchsorted(classes, graph.label[:graph.object_count])
+    known = np.zeros((len(label), len(classes)))
     weight = np.exp(-graph.length_between(ends) / REACH)
     for here, there in ((0, 1), (1, 0)):
         np.add.at(known, (ends[:, here], label[ends[:, there]]), weight)
@@ -74,9 +78,7 @@ def _alike(query: MultiTierGraph, reference: MultiTierGraph, mine: NDArray[np.fl
     here, there = slice(query.object_count), slice(reference.object_count)
     same = query.label[here, None] == reference.label[None, there]
     scale = np.log(query.size[here, None] + 1) - np.log(reference.size[None, there] + 1)
-    classes = min(mine.shape[1], other.shape[1])
-    around = mine[:, :classes] @ other[:, :classes].T
-    alike: NDArray[np.float64] = same * np.exp(-np.abs(scale).sum(axis=2)) * around
+    alike: NDArray[np.float64] = same * np.exp(-np.abs(scale).sum(axis=2)) * (mine @ other.T)
     return alike
 
 
