@@ -8,6 +8,8 @@ import json
 import pytest
 from walk_factory import command_on_a_walk
 
+from adversarial_lcd_ros.evaluation.certificates.page import certificates_page, draw_certificates
+
 
 @pytest.fixture
 def command(tmp_path, vocabulary, monkeypatch):
@@ -78,3 +80,17 @@ def test_frames_that_are_there_are_not_certified_again(tmp_path, command, capsys
 def test_what_cannot_be_certified_is_said_at_once(command, capsys, options, error):
     assert command(*options) == 2
     assert error in capsys.readouterr().err
+
+
+def test_the_page_says_what_made_it_and_not_where():
+    rows = [{'sequence': 'tour', 'target': 'wl', 'defences': 'none', 'changed': '',
+             'told_by': 'audit', 'nodes': 300.0, 'budget': 1, 'certify_ms': 9.0,
+             'accuracy': [1.0, 0.5], 'ci95': None,
+             'classes': {'new places': {'frames': 2, 'right': 2, 'certified': [2, 1]},
+                         'loops': {'frames': 0, 'right': 0, 'certified': [0, 0]}}}]
+    page = certificates_page(rows, ['/bin/adversarial-lcd', 'certify', '/data/tour', '--jobs', '2',
+                                    '--output', '/tmp/x', '--targets', 'wl'])
+    assert page.startswith('Made by `adversarial-lcd certify tour --targets wl`.')
+    assert '| tour | audit | `wl` | new places | 2 | 2 | 1 (50' in page
+    assert '| tour | audit | `wl` | loops | 0 | 0 | n/a |' in page
+    assert draw_certificates(rows).startswith(b'<?xml')

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 import shlex
 from typing import Any
@@ -30,6 +31,7 @@ PAGE, PICTURE = 'certificates.md', 'certificates.svg'
 _HEIGHT = 2.5  # inches, of a sequence
 _DASHES = ('-', '--', ':', '-.')
 _BALANCED = 'balanced'
+_OF_THE_MACHINE = ('--output', '--jobs', '--cache')  # each with a value
 _NOTES = """\
 Certified against b flips: right, and proven to stay so whichever at most b edges are added to
 the graph or deleted from it, by somebody who looks into the detector. Keyframes are clean, nodes
@@ -52,9 +54,11 @@ def write_page(folder: Path, rows: Sequence[Row], command_line: Sequence[str]) -
 
 
 def certificates_page(rows: Sequence[Row], command_line: Sequence[str]) -> str:
-    """Return the page in Markdown; folders of the machine are left out of its command."""
+    """Return the page in Markdown; what is of the machine is left out of its command."""
+    words = [word for before, word in pairwise(command_line)
+             if not {before, word} & set(_OF_THE_MACHINE)]
     command = shlex.join(['adversarial-lcd', *(Path(word).name if '/' in word else word
-                                               for word in command_line[1:])])
+                                               for word in words)])
     return '\n'.join((
         f'Made by `{command}`.\n', '# Certificates\n', _NOTES, '\n## Frames certified\n',
         markdown(certified_lines(rows)), '## Certified accuracy\n', _ACCURACY, '',

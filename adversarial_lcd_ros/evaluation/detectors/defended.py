@@ -16,8 +16,7 @@ from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 from adversarial_lcd_ros.registry import NONE
 
 _HEAD = ('sequence', 'target', 'defence', 'loops / new places', 'balanced accuracy',
-         '95 % interval', 'points lost', '95 % interval', 'precision', 'recall',
-         'true loops kept', 'kept behind the same without the rest')
+         'points lost', 'precision', 'recall', 'true loops kept', 'of those past the same alone')
 
 
 def settings_of(row: Row) -> tuple[str, bool, str]:
@@ -32,7 +31,7 @@ def defended_table(rows: Sequence[Row]) -> list[str]:
     Points lost are less than those of the first row without a defence, paired by frame. Kept are
     true loops of that row; where another row has the same defences and fewer settings, as
     ``geometric_check`` before ``geometric_hull``, the share of its true loops that are left
-    stands behind.
+    stands behind. Intervals: 95 %, over blocks of frames.
     """
     groups: dict[tuple[str, int, str], list[Row]] = {}
     for row in rows:
@@ -53,24 +52,28 @@ def _cells(row: Row, group: Sequence[Row]) -> list[str]:
     name = [row['defences'], *(part for part in row['changed'].split(', ')
                                if part and part not in common)]
     return [row['sequence'], f'`{row["target"]}`', ', '.join(name),
-            f'{row["positives"]} / {row["negatives"]}', wording.percent(row['balanced_accuracy']),
-            wording.interval(row['ci95'], 100.0) or wording.UNDEFINED,
-            *(_lost(row, bare) if row is not bare else ('', '')),
+            f'{row["positives"]} / {row["negatives"]}', _with_interval(
+                wording.percent(row['balanced_accuracy']), wording.interval(row['ci95'], 100.0)),
+            _lost(row, bare) if row is not bare else '',
             wording.percent(row['precision']), wording.percent(row['recall']),
             _kept(row, bare), _kept(row, alike) if alike not in (row, bare) else '']
 
 
-def _lost(row: Row, bare: Row) -> tuple[str, str]:
+def _with_interval(value: str, interval: str) -> str:
+    return f'{value} ({interval})' if interval else value
+
+
+def _lost(row: Row, bare: Row) -> str:
     """Return how much less balanced accuracy a row has than another, and the paired interval."""
     if row['balanced_accuracy'] is None or bare['balanced_accuracy'] is None:
-        return wording.UNDEFINED, wording.UNDEFINED
+        return wording.UNDEFINED
     before, after = _outcomes(bare), _outcomes(row)
     kind = np.select([np.isin(before, ('TP', 'FN', 'WM')), np.isin(before, ('FP', 'TN'))],
                      [POSITIVE, NEGATIVE], 0).astype(np.int8)
     interval = intervals.decline_interval(told_kind(kind, before, after), right(before),
                                           right(after), row['block'], seed=0)
     lost = 100 * (bare['balanced_accuracy'] - row['balanced_accuracy'])
-    return wording.points(lost), wording.interval(interval) or wording.UNDEFINED
+    return _with_interval(wording.points(lost), wording.interval(interval))
 
 
 def _kept(row: Row, other: Row) -> str:
