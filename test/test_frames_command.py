@@ -189,6 +189,7 @@ def test_the_rings_are_run_reported_and_gone_on_with(tmp_path, command, capsys):
     assert [row['attack'] for row in refused] == ['replay, unaware']
     assert refused[0]['invented'] == 0
     assert '### Target wl' in page
+    assert 'detector wl' in (tmp_path / 'out' / 'report.html').read_text()
     assert main(['report', str(tmp_path / 'out')]) == 0
     assert (tmp_path / 'out' / 'rings.md').read_text() == page
     hung = (tmp_path / 'out' / 'posters.json').read_bytes()

@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
 from adversarial_lcd_ros.evaluation.rings import plots, report
+from adversarial_lcd_ros.evaluation.rings.html import rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
     PairTask,
@@ -45,6 +46,7 @@ from adversarial_lcd_ros.evaluation.rings.summaries import (
     summarise,
     worst_cases,
 )
+from adversarial_lcd_ros.evaluation.rings.tables import ranking, standings
 from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
 from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
@@ -218,7 +220,8 @@ def test_the_page_is_of_the_summary_alone(tmp_path):
 
 
 def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
-    rows = [*ROWS, *SEALED, ring_row('', 'recall', 'recall', [LOST, LEFT], target='symbio')]
+    rows = [*ROWS, *SEALED, ring_row('', 'replay', 'replay', [LOST, LOST, MADE, MADE]),
+            ring_row('', 'recall', 'recall', [LOST, LEFT], target='symbio')]
     prices = [{'sequence': 'tour', 'target': target, 'defence': 'none', 'decision_us': 9.0,
                'more_us': more} for target, more in (('wl', 0.0), ('symbio', 7.0))]
     text = write_rings(tmp_path, rows, [], prices).read_text().replace('\u202f', ' ')
@@ -231,6 +234,19 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     assert '2 refused |' in text
     assert '| age 1, replayed 1 |' in text
     assert 'Sealed graphs: builder and detector share a key.' in text
+    # The same in the report, where each has the price of its own target.
+    summary = json.loads((tmp_path / 'summary.json').read_text())
+    assert {(entry.target, entry.more_us) for entry in standings(summary)
+            if entry.defence == 'none'} == {('wl', 0.0), ('symbio', 7.0)}
+    (tmp_path / 'configuration.json').write_text('{"settings": []}')
+    (tmp_path / 'environment.json').write_text('{"time_utc": "2026-01-02T03:04:05Z"}')
+    report = rings_html(tmp_path, summary).replace('\u202f', ' ')
+    assert ', refused: age 1, replayed 1</small>' in report
+    assert ', or refused 100 %' in report
+    assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [
+        'sealed graphs', 'rederive', 'none']
+    assert 'or 100.0 % where a refusal counts as an attack that failed' in report
+    assert 'Sealed graphs: builder and detector share a key.' in report
     # A folder from before there were seals and counts.
     old = tmp_path / 'old'
     old.mkdir()
@@ -329,11 +345,14 @@ def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
 def test_a_folder_of_rings_is_read_reported_and_compared(tmp_path):
     prices = [{'sequence': 'tour', 'defence': 'none', 'decision_us': 9.0, 'more_us': 0.0}]
     page = write_rings(tmp_path, ROWS, POSTERS, prices).read_text()
-    for name in ('configuration.json', 'environment.json'):
-        (tmp_path / name).write_text('{}')
+    (tmp_path / 'configuration.json').write_text('{"settings": []}')
+    (tmp_path / 'environment.json').write_text('{"time_utc": "2026-01-02T03:04:05Z"}')
     kind, results = open_results(tmp_path)
     assert kind.name == 'rings'
     assert kind.report(results).read_text() == page
+    report = (tmp_path / 'report.html').read_text()
+    assert 'detector wl' in report
+    assert '>replay, unaware<' in report
     assert len(kind.tables(results)[0].rows) == len(results.rows) == 4
     rows = [(figure.row, figure.name) for figure in kind.figures(results)]
     assert len(set(rows)) == len(rows)

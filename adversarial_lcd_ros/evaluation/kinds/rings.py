@@ -8,6 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jinja2 import TemplateError
+
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import wording
@@ -50,10 +52,10 @@ class RingsResults(ResultsKind):
                                       f'"{name}" of objects')
 
     def report(self, results: Results) -> Path:
-        """Write rings.md and its curves from the summary."""
+        """Write rings.md, its curves and report.html from the summary."""
         try:
             return write_page(results.folder, results.summary)
-        except (KeyError, TypeError) as error:
+        except (LookupError, TypeError, ValueError, TemplateError) as error:
             raise EvaluationError(f'{results.folder / SUMMARY} is damaged: {error!r}; run the '
                                   'evaluation again') from error
 

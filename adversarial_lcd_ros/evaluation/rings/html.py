@@ -13,6 +13,7 @@ from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.page import data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import CONFIGURATION, ENVIRONMENT, read_json
+from adversarial_lcd_ros.evaluation.rings.page import SEALED, refused, unexplained
 from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
 from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS
 from adversarial_lcd_ros.evaluation.rings.tables import (
@@ -37,7 +38,9 @@ def rings_html(folder: Path, summary: Mapping[str, Any]) -> str:
     """
     ranks = ranking(summary)
     page: str = load_template('rings.html.j2').render(
-        headline=headline(ranks), ranks=ranks, levels=LEVELS, matrices=matrices(summary['rows']),
+        headline=headline(ranks), ranks=ranks, unexplained=unexplained, refused=refused,
+        sealed=(SEALED.replace('**', '') if any(row.get('sealed') for row in summary['rows'])
+                else ''), levels=LEVELS, matrices=matrices(summary['rows']),
         posters=poster_table(summary['posters']) if summary['posters'] else None,
         sequences=list(dict.fromkeys(row['sequence'] for row in summary['rows'])),
         curves=data_uri(ring_curves(summary), 'svg+xml'),
@@ -57,14 +60,22 @@ def headline(ranks: Sequence[Rank]) -> str:
             f'{_over(len(bare.each))}.']
     for place, whose in ((0, 'the strongest attack on each frame that flips edges within the '
                              'usual budget'), (len(LEVELS) - 1, 'the strongest of all attacks')):
-        known = [rank for rank in here if rank.held[place] is not None]
+        known = [rank for rank in here if rank.unharmed[place] is not None]
         if bare.held[place] is None or not known:
             continue
-        best = max([bare, *known], key=lambda rank: rank.held[place] or 0.0)
+        best = max([bare, *known], key=lambda rank: rank.unharmed[place] or 0.0)
         said.append(f'Without a defence, {whose} leaves {wording.percent(bare.held[place])}; '
                     + ('no defence that was tried leaves more.' if best is bare else
-                       f'behind {best.defence}, {wording.percent(best.held[place])} are left.'))
+                       f'behind {best.defence}, {_left(best, place)}.'))
     return ' '.join(said)
+
+
+def _left(rank: Rank, place: int) -> str:
+    left = f'{wording.percent(rank.held[place])} are left'
+    if rank.unharmed[place] == rank.held[place]:
+        return left
+    return (f'{left}, or {wording.percent(rank.unharmed[place])} where a refusal counts as an '
+            'attack that failed')
 
 
 def _over(sequences: int) -> str:

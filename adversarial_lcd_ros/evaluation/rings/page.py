@@ -9,8 +9,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
-from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME
-from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS, NODES, Summary
+from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS, Summary
+from adversarial_lcd_ros.evaluation.rings.tables import (
+    Matrix,
+    Standing,
+    attack_title,
+    matrices,
+    poster_table,
+    standings,
+)
 
 _NOTES = """\
 Clean and attacked are balanced accuracies, decline is their difference in points, with the 95 %
@@ -20,7 +27,7 @@ Suppressed: loops that had been found and were lost. Invented: loops at new plac
 left alone; in brackets those that certainly name another place. The optimum is a yardstick that
 looks into the detector. Unexplained: edges that a defence cannot explain by the nodes, mean of
 clean and of attacked graphs, where the detector counts them."""
-_SEALED = """\
+SEALED = """\
 Sealed graphs: builder and detector share a key. Who knows of it sends graphs as they are: nothing
 is lost. What others send is refused, counted by cause, and decides nothing: new places are left
 alone, **and loops are lost**, with an alarm for each. Cutting the wire, or holding graphs back,
@@ -45,16 +52,16 @@ def rings_page(summary: Mapping[str, Any], command: str = '') -> str:
     rows: list[Summary] = summary['rows']
     parts = [f'Made by `{command}`.\n' if command else '',
              '# The rings: attacks beside defences\n', _NOTES,
-             *(['', _SEALED] if any(row.get('sealed') for row in rows) else []),
+             *(['', SEALED] if any(row.get('sealed') for row in rows) else []),
              '\n## Leaderboard of the defences\n', _WORST]
-    for target in dict.fromkeys(row['target'] for row in rows):
-        parts += [f'\n### Target {target}\n', *_leaderboard(
-            *([entry for entry in summary[name] if entry.get('target', target) == target]
-              for name in ('worst', 'prices', 'rows')))]
-    for target, sequence in dict.fromkeys((row['target'], row['sequence']) for row in rows):
-        here = [row for row in rows if (row['target'], row['sequence']) == (target, sequence)]
-        parts += [f'\n## {sequence}, {target}: decline in points\n', *_matrix(here),
-                  f'\n### {sequence}, {target}: each attack\n', *_details(here)]
+    board = standings(summary)
+    for target in dict.fromkeys(entry.target for entry in board):
+        parts += [f'\n### Target {target}\n',
+                  *_leaderboard([entry for entry in board if entry.target == target])]
+    for matrix in matrices(rows):
+        title = f'{matrix.sequence}, {matrix.target}'
+        parts += [f'\n## {title}: decline in points\n', *_matrix(matrix),
+                  f'\n### {title}: each attack\n', *_details(matrix.rows)]
     if summary['posters']:
         parts += ['\n## A poster in two places\n', _POSTERS, '', *_posters(summary['posters'])]
     return '\n'.join(parts).lstrip('\n') + '\n'
@@ -69,19 +76,11 @@ def _line(cells: Sequence[str]) -> str:
     return f'| {" | ".join(cells)} |'
 
 
-def _leaderboard(worst: Sequence[Summary], prices: Sequence[Summary],
-                 rows: Sequence[Summary]) -> list[str]:
-    price = {(entry['sequence'], entry['defence']): entry['more_us'] for entry in prices}
-    clean = {(row['sequence'], row['defence']): row['balanced_clean'] for row in rows}
-    left = {(entry['sequence'], entry['defence'], entry['level']): entry for entry in worst}
-    lines = []
-    for sequence, defence in dict.fromkeys((row['sequence'], row['defence']) for row in rows):
-        held = [left.get((sequence, defence, level)) for level in LEVELS]
-        more = price.get((sequence, defence))
-        lines.append([sequence, defence, wording.percent(clean[sequence, defence]),
-                      *(_worst(entry) for entry in held),
-                      wording.UNDEFINED if more is None else f'{more:+,.0f}'])
-    return table(['sequence', 'defence', 'clean', *LEVELS, 'price, us'], lines)
+def _leaderboard(board: Sequence[Standing]) -> list[str]:
+    return table(['sequence', 'defence', 'clean', *LEVELS, 'price, us'], [
+        [entry.sequence, entry.defence, wording.percent(entry.clean), *map(_worst, entry.held),
+         wording.UNDEFINED if entry.more_us is None else f'{entry.more_us:+,.0f}']
+        for entry in board])
 
 
 def _worst(entry: Summary | None) -> str:
@@ -90,86 +89,61 @@ def _worst(entry: Summary | None) -> str:
     bounds = wording.interval(entry['ci95'], 100.0)
     held = wording.percent(entry['balanced'])
     attacks = f'{entry["attacks"]} attack{"s" if entry["attacks"] > 1 else ""}'
-    refused = entry.get('balanced_or_refused')
-    or_refused = '' if refused is None else f', or refused {wording.percent(refused)}'
+    unharmed = entry.get('balanced_or_refused')
+    or_refused = '' if unharmed is None else f', or refused {wording.percent(unharmed)}'
     return f'{held} ({bounds}; {attacks}){or_refused}' if bounds else f'{held}{or_refused}'
 
 
-def _matrix(rows: Sequence[Summary]) -> list[str]:
-    defences = list(dict.fromkeys(row['defence'] for row in rows))
-    attacks = list(dict.fromkeys(_title(row) for row in rows))
-    cell = {(_title(row), row['defence']): row for row in rows}
-    lines = [[attack, *(_decline(cell.get((attack, defence))) for defence in defences)]
-             for attack in attacks]
-    return table(['attack', *defences], lines)
-
-
-def _title(row: Summary) -> str:
-    """Return what a recipe calls an attack; with its ratio where that is not the usual one."""
-    ratio = '' if row['ring'] == NODES or row['ratio'] == 3e-4 else f', r {row["ratio"]:g}'
-    return f'{row["attack"]}{ratio}'
+def _matrix(matrix: Matrix) -> list[str]:
+    return table(['attack', *matrix.defences],
+                 [[attack, *map(_decline, cells)] for attack, cells in matrix.lines])
 
 
 def _decline(row: Summary | None) -> str:
     if row is None:
         return ''
     bounds = wording.interval(row['ci95'])
-    refused = sum(row.get('refused', {}).values())
+    count = sum(row.get('refused', {}).values())
     return (wording.points(row['decline_pp']) + (f' ({bounds})' if bounds else '')
-            + (f', {refused} refused' if refused else ''))
+            + (f', {count} refused' if count else ''))
 
 
 def _details(rows: Sequence[Summary]) -> list[str]:
     return table(
         ['attack', 'defence', 'clean → attacked', 'suppressed', 'invented', 'edits', 'nodes',
          'queries', 'unexplained', 'refused'],
-        [[_title(row), row['defence'],
+        [[attack_title(row), row['defence'],
           f'{wording.percent(row["balanced_clean"])} → '
           f'{wording.percent(row["balanced_attacked"])}',
           f'{row["suppressed"]} of {row["found_clean"]}',
           f'{row["invented"]} of {row["silent_clean"]} ({row["invented_elsewhere"]})',
           wording.mean_count(row['edits_mean']), wording.mean_count(row['nodes_moved_mean']),
-          wording.mean_count(row['queries_mean']), _unexplained(row), ', '.join(
-              f'{cause} {count}' for cause, count in row.get('refused', {}).items())]
+          wording.mean_count(row['queries_mean']), unexplained(row), refused(row)]
          for row in rows])
 
 
-def _unexplained(row: Summary) -> str:
+def unexplained(row: Summary) -> str:
+    """Return the edges that nodes do not explain, clean and attacked; '' if nobody counted."""
     clean, attacked = (row.get(f'{name}_mean') for name in ('unexplained_clean', 'unexplained'))
     if clean is None or attacked is None:
         return ''
     return f'{wording.mean_count(clean)} → {wording.mean_count(attacked)}'
 
 
+def refused(row: Summary) -> str:
+    """Return how many graphs were refused, by cause; '' if none was."""
+    return ', '.join(f'{cause} {count}' for cause, count in row.get('refused', {}).items())
+
+
 def _posters(rows: Sequence[Summary]) -> list[str]:
-    targets = list(dict.fromkeys(row['target'] for row in rows))
-    checks = sorted(dict.fromkeys(row['check'] for row in rows), key=lambda name: name != 'none')
-    cell = {(row['sequence'], poster_title(row), row['target'], row['check']): row for row in rows}
-    lines = []
-    order = {BARE: 0, SAME: 1, OTHER: 2}
-    named = dict.fromkeys((row['sequence'], poster_title(row)) for row in sorted(
-        rows, key=lambda row: (row['sequence'], order[row['control']], row['count'],
-                               row['kind'], row['share'])))
-    for sequence, title in named:
-        first = cell[sequence, title, targets[0], checks[0]]
-        lines.append([sequence, title, str(first['pairs']), str(first['on_wall']), *(
-            ', '.join(_declared(cell[sequence, title, target, check]) for check in checks)
-            for target in targets)])
-    behind = ', '.join(checks)
-    return [f'Each cell: {behind}.', '',
-            *table(['sequence', 'poster', 'pairs', 'on walls', *targets], lines)]
+    found = poster_table(rows)
+    return [f'Each cell: {", ".join(found.checks)}.', '', *table(
+        ['sequence', 'poster', 'pairs', 'on walls', *found.targets],
+        [[line.sequence, line.title, str(line.pairs), str(line.on_wall),
+          *(', '.join(map(_declared, group)) for group in line.cells)]
+         for line in found.lines])]
 
 
 def _declared(row: Summary) -> str:
     others = row['elsewhere'] - row['to_poster']
     return f'{row["to_poster"]}{f" (+{others})" if others > 0 else ""}'
-
-
-def poster_title(row: Mapping[str, Any]) -> str:
-    """Return what hangs in a scene, in words."""
-    if row['control'] == BARE:
-        return BARE
-    size = f'{100 * row["share"]:g} % of the frame'
-    if row['control'] == OTHER:
-        return f'{OTHER}, {row["kind"]}, {size}'
-    return f'{"two " if row["count"] == 2 else ""}{row["kind"]}, {size}'

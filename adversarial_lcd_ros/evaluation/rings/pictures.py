@@ -14,10 +14,10 @@ from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
 from adversarial_lcd_ros.evaluation.pictures import Picture
-from adversarial_lcd_ros.evaluation.rings.page import poster_title
 from adversarial_lcd_ros.evaluation.rings.posters import PairTask, condition_of, scene_of
 from adversarial_lcd_ros.evaluation.rings.scene import SAME
 from adversarial_lcd_ros.evaluation.rings.summaries import FLIPS, NODES, ring_of
+from adversarial_lcd_ros.evaluation.rings.tables import poster_title
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 

@@ -1,7 +1,7 @@
 # Copyright 2026 adversarial_lcd_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Results of the rings: summary.json, rings.md and its curves."""
+"""Results of the rings: summary.json, report.html, rings.md and its curves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,15 @@ from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.errors import FileError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
-from adversarial_lcd_ros.evaluation.results import PICTURES, SUMMARY, summary_document
+from adversarial_lcd_ros.evaluation.results import (
+    CONFIGURATION,
+    ENVIRONMENT,
+    PICTURES,
+    REPORT,
+    SUMMARY,
+    summary_document,
+)
+from adversarial_lcd_ros.evaluation.rings.html import rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
 from adversarial_lcd_ros.evaluation.rings.posters import (
@@ -131,10 +139,28 @@ def write_rings(folder: Path, rows: Sequence[Row], posters: Sequence[Row],
 
 
 def write_page(folder: Path, summary: Mapping[str, Any], command: str = '') -> Path:
-    """Write rings.md and its curves from the content of summary.json; return the page's path."""
+    """
+    Write rings.md, its curves and report.html from the content of summary.json.
+
+    Parameters
+    ----------
+    folder : Path
+        Where settings and environment are not told, there is no report.html.
+    summary : mapping
+    command : str
+        That made it, where the page is to say so.
+
+    Returns
+    -------
+    Path
+        Of rings.md.
+
+    """
     write_bytes(folder / CURVES, ring_curves(summary))
     path = folder / PAGE
     shown = ''.join(f'\n![{title}]({PICTURES}/{number:02d}.jpg)\n\n*{title}. {caption}*\n'
                     for number, (title, caption, _) in enumerate(read_pictures(folder), 1))
     write_text(path, f'{rings_page(summary, command)}\n![curves]({CURVES})\n{shown}')
+    if (folder / CONFIGURATION).is_file() and (folder / ENVIRONMENT).is_file():
+        write_text(folder / REPORT, rings_html(folder, summary))
     return path

@@ -78,6 +78,8 @@ class Rank:
     clean : float or None
     held : tuple of float or None
         Of each of LEVELS; None: an attack is missing on a sequence.
+    unharmed : tuple of float or None
+        The same, where a refusal, which raises an alarm, counts as an attack that failed.
     attacks : tuple of int
         How many attacks each level holds, at least.
     more_us : float or None
@@ -91,6 +93,7 @@ class Rank:
     defence: str
     clean: float | None
     held: tuple[float | None, ...]
+    unharmed: tuple[float | None, ...]
     attacks: tuple[int, ...]
     more_us: float | None
     each: tuple[Standing, ...]
@@ -118,21 +121,26 @@ def matrices(rows: Sequence[Summary]) -> list[Matrix]:
 
 def standings(summary: Mapping[str, Any]) -> list[Standing]:
     """Return what is left of every detector with every defence, from summary.json's content."""
-    price = {(entry['sequence'], entry['defence']): entry['more_us']
+    if not summary['rows']:
+        return []
+    # Of one target, where it is not said.
+    target = summary['rows'][0]['target']
+    price = {(entry['sequence'], entry.get('target', target), entry['defence']): entry['more_us']
              for entry in summary['prices']}
     clean = {(row['sequence'], row['target'], row['defence']): row['balanced_clean']
              for row in summary['rows']}
     left = {(entry['sequence'], entry['target'], entry['defence'], entry['level']): entry
             for entry in summary['worst']}
     return [Standing(*key, value, tuple(left.get((*key, level)) for level in LEVELS),
-                     price.get((key[0], key[2]))) for key, value in clean.items()]
+                     price.get(key)) for key, value in clean.items()]
 
 
 def ranking(summary: Mapping[str, Any]) -> list[Rank]:
     """
     Return the defences by what is left over all sequences, the most first, by target.
 
-    Those that were not attacked at a level stand behind those that were.
+    A refusal counts as an attack that failed: it misleads nobody. Those that were not attacked at
+    a level stand behind those that were.
     """
     groups: dict[tuple[str, str], list[Standing]] = {}
     for entry in standings(summary):
@@ -140,7 +148,7 @@ def ranking(summary: Mapping[str, Any]) -> list[Rank]:
     targets = list(dict.fromkeys(target for target, _ in groups))
     ranks = [_rank(target, defence, each) for (target, defence), each in groups.items()]
     return sorted(ranks, key=lambda rank: (-targets.index(rank.target), *(
-        -1.0 if held is None else held for held in rank.held)), reverse=True)
+        -1.0 if left is None else left for left in rank.unharmed)), reverse=True)
 
 
 def _rank(target: str, defence: str, each: Sequence[Standing]) -> Rank:
@@ -149,8 +157,14 @@ def _rank(target: str, defence: str, each: Sequence[Standing]) -> Rank:
     return Rank(
         target, defence, _mean(entry.clean for entry in each),
         tuple(_mean(entry and entry['balanced'] for entry in level) for level in levels),
+        tuple(_mean(entry and _unharmed(entry) for entry in level) for level in levels),
         tuple(min((entry['attacks'] for entry in level if entry), default=0) for level in levels),
         float(np.median(prices)) if prices else None, tuple(each))
+
+
+def _unharmed(entry: Summary) -> float | None:
+    found: float | None = entry.get('balanced_or_refused')
+    return entry['balanced'] if found is None else found
 
 
 def _mean(values: Iterable[float | None]) -> float | None:
