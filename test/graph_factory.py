@@ -66,3 +66,20 @@ def with_scene(graph):
 def suited(target, graph):
     """Return a graph as a target needs it."""
     return with_scene(graph) if TARGETS[target].graph_variant else graph
+
+
+def patch(graph, rng, features, objects):
+    """Return a graph of a few of the nodes: features around a random one, the last objects."""
+    feature = np.arange(graph.object_count, graph.node_count)
+    distance = np.linalg.norm(graph.position[feature]
+                              - graph.position[rng.choice(feature)], axis=1)
+    kept = np.r_[np.arange(max(graph.object_count - objects, 0), graph.object_count),
+                 np.sort(feature[distance.argsort()[:features]])]
+    place = np.full(graph.node_count, -1)
+    place[kept] = np.arange(len(kept))
+    edge = place[graph.edge]
+    there = (edge >= 0).all(axis=1)
+    return replace(graph, edge=edge[there].astype(np.uint32),
+                   edge_length=graph.edge_length[there], **{
+                       name: getattr(graph, name)[kept] for name in
+                       ('tier', 'label', 'position', 'size', 'score', 'descriptor')})

@@ -8,6 +8,8 @@ from test_report import ATTACKS, COUNT, decide, make_labels, make_runs
 
 from adversarial_lcd_ros.config import BACK_ENDS, LabelConfig, LcdConfig, MapConfig
 from adversarial_lcd_ros.evaluation import results
+from adversarial_lcd_ros.evaluation.certificates import run as certificates
+from adversarial_lcd_ros.evaluation.certificates.page import write_page
 from adversarial_lcd_ros.evaluation.detectors import run as targets
 from adversarial_lcd_ros.evaluation.labels import run as label_runs
 from adversarial_lcd_ros.evaluation.labels.page import PATH, render_page
@@ -20,7 +22,7 @@ from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_do
 from adversarial_lcd_ros.evaluation.rings.report import write_rings
 from adversarial_lcd_ros.evaluation.store import open_store
 
-KINDS = ('replay', 'frames', 'targets', 'labels', 'map', 'rings')
+KINDS = ('replay', 'frames', 'targets', 'labels', 'map', 'rings', 'certificates')
 
 
 def replay(path, *, found=range(30, 60), lcd=None, labels=None):
@@ -64,7 +66,8 @@ def targets_folder(path, *, accuracy=0.75, lcd=None, labels=None):
     rows = [{**row, 'protocol': 'pairs', 'n_pairs': 18, 'distinct_pairs': 17, 'seeds': 1},
             {**row, 'protocol': 'live', 'n_frames': 60, 'wrong_matches': 1,
              'declared_elsewhere': 2, 'untold_matches': 3,
-             'latency_to_first_closure_s': 2.0}]
+             'latency_to_first_closure_s': 2.0, 'block': 6, 'outcomes': ','.join(
+                 9 * ['TP'] + 9 * ['TN'] + 42 * [''])}]
     made.write_json(results.SUMMARY, results.summary_document(
         targets.KIND, targets.SCHEMA, rows))
     return path
@@ -147,5 +150,22 @@ def rings_folder(path, *, lost=1, lcd=None, labels=None):
     return path
 
 
+def certificates_folder(path, *, held=5, lcd=None, labels=None):
+    """Return the certificates of a detector; ``held``: loops certified against 2 flips, of 8."""
+    made = folder(path, [lcd or LcdConfig(), labels or LabelConfig()])
+    loops = [7, 6, held]
+    row = {'sequence': 'tour', 'target': 'edges', 'defences': 'length_check', 'changed': '',
+           'told_by': 'co-visibility', 'nodes': 299.5, 'budget': 2, 'certify_ms': 17.0,
+           'classes': {'new places': {'frames': 4, 'right': 4, 'certified': [4, 4, 2]},
+                       'loops': {'frames': 8, 'right': 7, 'certified': loops}},
+           'accuracy': [(new / 4 + loop / 8) / 2
+                        for new, loop in zip((4, 4, 2), loops, strict=True)],
+           'ci95': [0.25, 0.75]}
+    made.write_json(results.SUMMARY, results.summary_document(
+        certificates.KIND, certificates.SCHEMA, [row]))
+    write_page(path, [row], ['adversarial-lcd', 'evaluate'])
+    return path
+
+
 MAKERS = dict(zip(KINDS, (replay, frames, targets_folder, labels_folder, map_folder,
-                          rings_folder), strict=True))
+                          rings_folder, certificates_folder), strict=True))

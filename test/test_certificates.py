@@ -121,6 +121,9 @@ def test_the_largest_ratio_is_the_largest(terms, flips, otherwise):
             members[list(chosen)] ^= True
             best = max(best, ratio(members))
     assert largest_ratio(top, bottom, present, flips, otherwise) == pytest.approx(best, abs=1e-9)
+    known = largest_ratio(top, bottom, present, max(flips - 1, 0), otherwise)
+    assert largest_ratio(top, bottom, present, flips, otherwise, known) == pytest.approx(
+        best, abs=1e-9)
 
 
 @given(graphs(min_nodes=3, max_nodes=5), st.integers(0, 2**16))

@@ -13,6 +13,7 @@ import pytest
 from results_factory import (
     KINDS,
     MAKERS,
+    certificates_folder,
     frames,
     labels_folder,
     map_folder,
@@ -32,8 +33,10 @@ from adversarial_lcd_ros.evaluation.replay.summary import as_document, from_docu
 CHANGED = {'replay': partial(replay, found=range(33, 60)), 'frames': partial(frames, power=0.6),
            'targets': partial(targets_folder, accuracy=0.5),
            'labels': partial(labels_folder, positive=10), 'map': partial(map_folder, off_m=2.0),
-           'rings': partial(rings_folder, lost=4)}
-REPORT = {**dict.fromkeys(KINDS, 'report.html'), 'targets': 'target.md', 'rings': 'rings.md'}
+           'rings': partial(rings_folder, lost=4),
+           'certificates': partial(certificates_folder, held=2)}
+REPORT = {**dict.fromkeys(KINDS, 'report.html'), 'targets': 'target.md', 'rings': 'rings.md',
+          'certificates': 'certificates.md'}
 every_kind = pytest.mark.parametrize('kind', KINDS)
 
 

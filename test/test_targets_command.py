@@ -10,8 +10,10 @@ from walk_factory import command_on_a_walk
 
 from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.detectors.defended import defended_table
 from adversarial_lcd_ros.evaluation.detectors.recipe import Choices, recipe_sequences
 from adversarial_lcd_ros.evaluation.detectors.tables import target_tables
+from adversarial_lcd_ros.evaluation.wording import points
 from adversarial_lcd_ros.paths import model_path
 from adversarial_lcd_ros.training.model_folder import trained_on
 
@@ -88,6 +90,49 @@ def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
     assert '| walk, own_defences:IgnoresEdges, ' in capsys.readouterr().out
 
 
+def test_defences_are_laid_beside_the_detector_without(tmp_path, command, capsys):
+    assert command('--targets', 'edges', '--protocols', 'live', '--lcd-geometric-inliers', '21',
+                   '--defences', 'none', 'rederive_check', 'geometric_check') == 0
+    rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
+    assert [row['defences'] for row in rows] == ['none', 'rederive_check', 'geometric_check']
+    # What only counts changes nothing; more matches are asked for than there are: nothing passes.
+    assert rows[0]['outcomes'] == rows[1]['outcomes']
+    assert rows[0]['recall'] > 0 == rows[2]['recall']
+    found = rows[0]['outcomes'].split(',').count('TP')
+    table = capsys.readouterr().out.split('| defence |')[1].splitlines()[2:5]
+    cells = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    assert [line[2] for line in cells] == ['none', 'rederive_check', 'geometric_check']
+    assert [line[5].split(' (')[0] for line in cells] == ['', '0.0', points(
+        100 * (rows[0]['balanced_accuracy'] - rows[2]['balanced_accuracy']))]
+    assert [line[8].split(' (')[0] for line in cells] == [
+        f'{found} of {found}', f'{found} of {found}', f'0 of {found}']
+
+
+def outcome_row(defences, outcomes, changed=''):
+    outcomes = outcomes.split()
+    return {'sequence': 'tour', 'target': 'wl', 'protocol': 'live', 'nodes': 300,
+            'defences': defences, 'geometric_check': False, 'changed': changed, 'positives': 4,
+            'negatives': 2, 'balanced_accuracy': (outcomes.count('TP') / 4
+                                                  + outcomes.count('TN') / 2) / 2,
+            'ci95': None, 'precision': None, 'recall': None, 'block': 1,
+            'outcomes': ','.join(outcomes)}
+
+
+def test_true_loops_are_kept_frame_by_frame():
+    table, = defended_table([
+        outcome_row('none', 'TP TP TP FN TN FP'),
+        outcome_row('geometric_check', 'TP TP FN FN TN TN'),
+        # One of those past the check is lost; one that had never been found does not count.
+        outcome_row('geometric_check', 'TP FN FN TP TN TN', 'geometric_hull 0.1')])
+    without, check, hull = ([cell.strip() for cell in line.strip('|').split('|')]
+                            for line in table.splitlines()[2:])
+    assert [line[5].split(' (')[0] for line in (without, check, hull)] == ['', '-12.5', '-12.5']
+    assert (without[8][:6], check[8][:6], hull[8][:6]) == ('3 of 3', '2 of 3', '1 of 3')
+    assert (without[9], check[9], hull[9][:6]) == ('', '', '1 of 2')
+    assert hull[2] == 'geometric_check, geometric_hull 0.1'
+    assert defended_table([outcome_row('none', 'TP TP TP FN TN FP')]) == []
+
+
 def test_live_and_pairs_see_the_threshold(tmp_path, command):
     assert command('--targets', 'edges', '--lcd-threshold', '0') == 0
     for row in json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']:
@@ -104,6 +149,11 @@ def test_wrong_options_are_refused_in_one_line(command, capsys, options, said):
     assert said in capsys.readouterr().err
 
 
+def write(path, setting):
+    path.write_text(f'sequences:\n  - source: a\n    {setting}\n')
+    return str(path)
+
+
 def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
     one, two = tmp_path / 'one.yaml', tmp_path / 'two.yaml'
     one.write_text('sequences:\n  - {source: a@0.5:1, nodes: [100, 300], lcd: {min_gap_s: 3}}\n'
@@ -112,6 +162,12 @@ def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
     assert first.source == str(tmp_path / 'a@0.5:1')
     assert (first.nodes, first.lcd.min_gap_s, first.lcd.candidates) == ((100, 300), 3.0, 3)
     assert (second.targets, second.nodes, second.lcd.min_gap_s) == (('vbow',), (300,), 8.0)
+    third, = recipe_sequences(write(two, 'detectors: [{}, {defences: length_check}]'), tmp_path,
+                              Choices({}, {'threshold': 0.9}, {}))
+    assert [(lcd.defences, lcd.threshold) for lcd in third.detectors] == [
+        ('none', 0.9), ('length_check', 0.9)]
+    with pytest.raises(ConfigError, match='expected a list of settings of the detector'):
+        recipe_sequences(write(two, 'detectors: length_check'), tmp_path, NOTHING)
     two.write_text('sequences:\n  - {source: b, target: vbow}\n')
     with pytest.raises(ConfigError, match=r'unknown key target.*; there are: source'):
         recipe_sequences(str(two), tmp_path, NOTHING)
@@ -119,9 +175,11 @@ def test_a_recipe_gives_each_sequence_its_settings(tmp_path):
         recipe_sequences('target', tmp_path / 'nowhere', NOTHING)
 
 
-def test_the_recipe_that_ships_is_one(tmp_path):
+def test_the_recipes_that_ship_are_some(tmp_path):
     sequences = recipe_sequences('target', tmp_path, NOTHING)
     assert len({sequence.source for sequence in sequences}) == len(sequences) == 7
+    sequences = recipe_sequences('defences', tmp_path, NOTHING)
+    assert {len(sequence.detectors) for sequence in sequences} == {7}
 
 
 SHIPPED = model_path('target_wl.json')

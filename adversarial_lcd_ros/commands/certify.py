@@ -19,6 +19,7 @@ from adversarial_lcd_ros.commands.common import (
     check_counts,
     print_json,
     progress_bar,
+    tell,
 )
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError
@@ -32,9 +33,11 @@ from adversarial_lcd_ros.settings import (
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.certificates.run import CertificateTask
+    from adversarial_lcd_ros.evaluation.store import CellStore
+    from adversarial_lcd_ros.evaluation.streams import Stream
 
-RESULTS, TABLE, PICTURE = 'certificates.json', 'certificates.md', 'certificates.svg'
-_DEFAULT_TARGETS, _DEFAULT_DEFENCES = ('edges', 'wl'), (NONE, 'length_check')
+_DEFAULT_TARGETS, _DEFAULT_DEFENCES = ('edges', 'wl', 'symbio'), (NONE, 'length_check')
+_CONFIGS = ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'), (LabelConfig, 'label-'))
 
 
 def add(commands: Commands) -> None:
@@ -46,7 +49,8 @@ def add(commands: Commands) -> None:
                         help='bag, folder or bag of graphs with ground truth; PATH@FROM:TO takes '
                         'a part of its frames')
     parser.add_argument('--output', type=Path, default=Path('results/certificates'),
-                        metavar='FOLDER', help='(default: %(default)s)')
+                        metavar='FOLDER', help='frames that are there are not certified again '
+                        '(default: %(default)s)')
     parser.add_argument('--targets', nargs='+', default=_DEFAULT_TARGETS, metavar='NAME',
                         help=f'(default: {" ".join(_DEFAULT_TARGETS)})')
     parser.add_argument('--defences', nargs='+', default=_DEFAULT_DEFENCES, metavar='NAMES',
@@ -60,47 +64,59 @@ def add(commands: Commands) -> None:
     add_work_options(parser)
     add_json_option(parser)
     add_models_option(parser)
-    for config, prefix in ((BuilderConfig, 'builder-'), (LcdConfig, 'lcd-'),
-                           (LabelConfig, 'label-')):
+    for config, prefix in _CONFIGS:
         add_config_options(parser, config, prefix)
 
 
 def _certify(options: Namespace) -> None:
-    from adversarial_lcd_ros.evaluation.certificates.run import KIND, SCHEMA, run_certificates
+    from adversarial_lcd_ros.evaluation.certificates.page import write_page
+    from adversarial_lcd_ros.evaluation.certificates.run import KIND, SCHEMA
+    from adversarial_lcd_ros.evaluation.certificates.summaries import summarise
     from adversarial_lcd_ros.evaluation.certificates.tables import (
-        certificate_table,
-        draw_certificates,
+        accuracy_lines,
+        certified_lines,
+        markdown,
     )
-    from adversarial_lcd_ros.evaluation.results import summary_document
-    from adversarial_lcd_ros.evaluation.workers import local_workers
-    from adversarial_lcd_ros.files.writing import write_bytes, write_json, write_text
+    from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
+    from adversarial_lcd_ros.evaluation.store import open_store
 
-    tasks = _tasks(options)
-    options.output.mkdir(parents=True, exist_ok=True)
-    rows = []
-    with local_workers(options.jobs) as run, progress_bar('certificates') as progress:
-        progress(0, len(tasks))
-        for row in run(run_certificates, tasks):
-            rows.append(row)
-            progress(len(rows), len(tasks))
-    order = {(task.stream.name, task.lcd.target, task.lcd.defences): place
-             for place, task in enumerate(tasks)}
-    rows.sort(key=lambda row: order[row['sequence'], row['target'], row['defences']])
-    summary = summary_document(KIND, SCHEMA, rows, {'command_line': sys.argv})
-    write_json(options.output / RESULTS, summary)
-    table = certificate_table(rows)
-    write_text(options.output / TABLE, table)
-    write_bytes(options.output / PICTURE, draw_certificates(rows))
+    detectors = _detectors(options)
+    with open_store(options.output) as store:
+        streams = _streams(options)
+        tasks = _tasks(options, streams, detectors)
+        results = ResultsFolder(options.output)
+        results.write_setup([config_from_options(options, config) for config, _ in _CONFIGS],
+                            sys.argv, 0, {'targets': list(options.targets),
+                                          'defences': list(options.defences)})
+        _run(options, tasks, store)
+        summary = summary_document(KIND, SCHEMA, summarise(tasks, store.rows))
+        results.write_json(SUMMARY, summary)
+    page = write_page(options.output, summary['rows'], sys.argv)
     if options.json:
         print_json({'folder': str(options.output), **summary})
         return
-    print(table, end='')
-    print(options.output / PICTURE)
+    print(markdown(certified_lines(summary['rows'])), markdown(accuracy_lines(summary['rows'])),
+          page, sep='\n')
 
 
-def _tasks(options: Namespace) -> list[CertificateTask]:
-    from adversarial_lcd_ros.evaluation.certificates.run import CertificateTask
-    from adversarial_lcd_ros.evaluation.streams import open_streams
+def _run(options: Namespace, tasks: list[CertificateTask], store: CellStore) -> None:
+    """Run what is left of the tasks."""
+    from adversarial_lcd_ros.evaluation.certificates.run import CELL_COLUMNS, run_certificates
+    from adversarial_lcd_ros.evaluation.workers import local_workers
+
+    store.check([task.key for task in tasks], CELL_COLUMNS)
+    left = [task for task in tasks if task.key not in store.rows]
+    frames, done = sum(len(task.frames) for task in left), 0
+    tell(f'{frames} of {sum(len(task.frames) for task in tasks)} certificates to make')
+    with local_workers(options.jobs) as run, progress_bar('certificates') as progress:
+        progress(0, frames)
+        for key, cell in run(run_certificates, left):
+            store.add(key, cell)
+            done += len(cell['frames'])
+            progress(done, frames)
+
+
+def _detectors(options: Namespace) -> list[LcdConfig]:
     from adversarial_lcd_ros.lcd.certificates import check_provable
 
     check_counts(options, 'budget', 'frames', 'jobs')
@@ -110,13 +126,35 @@ def _tasks(options: Namespace) -> list[CertificateTask]:
                               'or several')
     lcd = config_from_options(options, LcdConfig)
     detectors = [replace(lcd, target=target, defences=defences)
-                 for target in options.targets for defences in options.defences]
+                 for target in dict.fromkeys(options.targets)
+                 for defences in dict.fromkeys(options.defences)]
     for config in detectors:
         check_provable(config)
+    return detectors
+
+
+def _streams(options: Namespace) -> list[Stream]:
+    """Return the sequences, each in the variants of graphs that the targets need."""
+    from adversarial_lcd_ros.evaluation.streams import open_streams
+    from adversarial_lcd_ros.lcd.targets import needed_variant
+
     builder = config_from_options(options, BuilderConfig)
     labels = config_from_options(options, LabelConfig)
+    streams: list[Stream] = []
     with progress_bar('graphs') as progress:
-        streams = open_streams(options.sources, [builder.features], builder, labels,
-                               options.cache, lambda _, done, total: progress(done, total))
-    return [CertificateTask(stream, config, options.budget, options.frames)
-            for stream in streams for config in detectors]
+        for variant in dict.fromkeys(map(needed_variant, options.targets)):
+            streams += open_streams(
+                options.sources, [builder.features], builder, labels, options.cache,
+                lambda _, done, total: progress(done, total), variant=variant)
+    return streams
+
+
+def _tasks(options: Namespace, streams: list[Stream], detectors: list[LcdConfig]
+           ) -> list[CertificateTask]:
+    from adversarial_lcd_ros.evaluation.certificates.run import certificate_tasks
+    from adversarial_lcd_ros.lcd.targets import needed_variant
+
+    return [task for name in dict.fromkeys(stream.name for stream in streams)
+            for lcd in detectors for stream in streams
+            if (stream.name, stream.variant) == (name, needed_variant(lcd.target))
+            for task in certificate_tasks(stream, lcd, options.budget, options.frames)]

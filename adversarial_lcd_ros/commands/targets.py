@@ -47,7 +47,7 @@ def add(commands: Commands) -> None:
                         help='bag, folder or bag of graphs with ground truth; PATH@FROM:TO takes '
                         'a part of its frames')
     parser.add_argument('--recipe', metavar='NAME', help='sequences with their settings: a '
-                        'recipe that ships ("target"), or a .yaml file like it')
+                        'recipe that ships ("target", "defences"), or a .yaml file like it')
     parser.add_argument('--data', type=Path, default=Path('../shared/data'), metavar='FOLDER',
                         help='where the sequences of a recipe are (default: %(default)s)')
     parser.add_argument('--output', type=Path, default=Path('results/target'), metavar='FOLDER',
@@ -55,6 +55,9 @@ def add(commands: Commands) -> None:
     parser.add_argument('--targets', nargs='+', metavar='NAME',
                         help=f'those to evaluate (default: {" ".join(TARGETS)}, or what the '
                         'recipe says)')
+    parser.add_argument('--defences', nargs='+', metavar='NAMES',
+                        help='each a value of --lcd-defences; a row each (default: that of the '
+                        'detector, or what the recipe says)')
     parser.add_argument('--protocols', nargs='+', choices=PROTOCOLS, default=PROTOCOLS,
                         metavar='NAME', help='pairs, live, or both (default)')
     parser.add_argument('--nodes', nargs='+', type=int, metavar='N',
@@ -122,8 +125,10 @@ def _sequences(options: Namespace) -> list[TargetSequence]:
     builder, lcd, labels = (chosen_settings(options, config) for config, _ in _CONFIGS)
     if 'target' in lcd:
         raise ConfigError('--lcd-target names one target: here --targets does')
+    if 'defences' in lcd and options.defences:
+        raise ConfigError('--lcd-defences and --defences: expected one of them')
     choices = Choices(builder, lcd, labels, tuple(options.nodes or ()),
-                      tuple(options.targets or ()))
+                      tuple(options.targets or ()), tuple(options.defences or ()))
     if options.recipe:
         if source_options(options):
             raise ConfigError('how a recording is read is given for named sequences only: a '
@@ -138,12 +143,13 @@ def _tasks(options: Namespace, sequences: list[TargetSequence]) -> list[TargetTa
     from adversarial_lcd_ros.lcd.targets import needed_variant
 
     seeds = tuple(range(options.seed, options.seed + options.draws))
-    return [TargetTask(stream, target, protocol, sequence.lcd, options.pairs, seeds,
-                       sequence.scored, sequence.labels)
+    return [TargetTask(stream, target, protocol, lcd, options.pairs, seeds, sequence.scored,
+                       sequence.labels)
             for sequence in sequences
             for variant in dict.fromkeys(map(needed_variant, sequence.targets))
             for stream in _streams(sequence, options.cache, variant)
-            for protocol in options.protocols for target in sequence.targets
+            for protocol in options.protocols for lcd in sequence.detectors
+            for target in sequence.targets
             if needed_variant(target) == variant]
 
 

@@ -20,7 +20,8 @@ _STEEPEST = 1 / sqrt(3)
 
 @compiled
 def largest_ratio(top: NDArray[np.float64], bottom: NDArray[np.float64],
-                  present: NDArray[np.bool_], flips: int, otherwise: float) -> float:
+                  present: NDArray[np.bool_], flips: int, otherwise: float,
+                  known: float = -np.inf) -> float:
     """
     Return the largest sum(top) / sum(bottom) over the terms of a set, after some flips of it.
 
@@ -37,6 +38,8 @@ def largest_ratio(top: NDArray[np.float64], bottom: NDArray[np.float64],
     flips : int
         Most terms that come or go.
     otherwise : float
+    known : float
+        A ratio that so many flips are known to reach, as fewer do: saves rounds.
 
     """
     count = 0
@@ -49,6 +52,7 @@ def largest_ratio(top: NDArray[np.float64], bottom: NDArray[np.float64],
     ratio = above / below if count else otherwise
     if flips >= count:
         ratio = max(ratio, otherwise)
+    ratio = max(ratio, known)
     gain = np.empty(len(top))
     for _ in range(_ROUNDS):
         for i in range(len(top)):
@@ -109,23 +113,32 @@ def cosine_bounds(node: NDArray[np.int64], gram: NDArray[np.float64],
         here[u], weight[u] = False, 0.0  # no node is its own neighbour
         alpha = min(max(towards[u], -1.0), 1.0)
         theta, sine = acos(alpha), sqrt(max(1 - alpha * alpha, 0.0))
-        for level in range(len(levels)):
-            flips = levels[level]
-            slope = _STEEPEST
-            if sine > 1e-6:
-                slope = min(slope, largest_ratio(
-                    weight * (towards - along * alpha) / sine, weight * (2 + along) + _TINY,
-                    here, flips, 0.0))
-            angle = theta - atan(slope)
-            largest[row, level] = cos(min(max(angle, 0.0), pi))
-            least[row, level] = _least(weight, along, towards, alpha, here, flips)
+        _turned_towards(weight * (towards - along * alpha), weight * (2 + along) + _TINY, sine,
+                        theta, here, levels, largest[row])
+        _turned_away(weight, along, towards, alpha, here, levels, least[row])
     return least, largest
 
 
 @compiled
-def _least(weight: NDArray[np.float64], along: NDArray[np.float64],
-           towards: NDArray[np.float64], alpha: float, here: NDArray[np.bool_], flips: int
-           ) -> float:
+def _turned_towards(top: NDArray[np.float64], bottom: NDArray[np.float64], sine: float,
+                    theta: float, here: NDArray[np.bool_], levels: NDArray[np.int64],
+                    largest: NDArray[np.float64]) -> None:
+    """Write the largest cosine after each number of flips, ascending, into ``largest``."""
+    slope = -np.inf
+    for level in range(len(levels)):
+        if sine > 1e-6 and slope < _STEEPEST:
+            slope = largest_ratio(top / sine, bottom, here, levels[level], 0.0, slope)
+        else:
+            slope = _STEEPEST
+        angle = theta - atan(min(slope, _STEEPEST))
+        largest[level] = cos(min(max(angle, 0.0), pi))
+
+
+@compiled
+def _turned_away(weight: NDArray[np.float64], along: NDArray[np.float64],
+                 towards: NDArray[np.float64], alpha: float, here: NDArray[np.bool_],
+                 levels: NDArray[np.int64], least: NDArray[np.float64]) -> None:
+    """Write the least cosine after each number of flips, ascending, into ``least``."""
     total, centre = 0.0, 0.0
     for i in range(len(weight)):
         if here[i]:
@@ -134,10 +147,12 @@ def _least(weight: NDArray[np.float64], along: NDArray[np.float64],
     centre = max(centre / total, -0.5) if total > 0 else 0.0
     root = sqrt(1.25 + centre)
     # The ratio of -numerator to denominator is largest where the cosine is least.
-    worst: float = largest_ratio(-weight * (alpha + towards / 2),
-                          weight * (root + (along - centre) / (2 * root)) + _TINY, here, flips,
-                          -alpha)
-    return max(-worst, -1.0)
+    top = -weight * (alpha + towards / 2)
+    bottom = weight * (root + (along - centre) / (2 * root)) + _TINY
+    worst = -np.inf
+    for level in range(len(levels)):
+        worst = largest_ratio(top, bottom, here, levels[level], -alpha, worst)
+        least[level] = max(-worst, -1.0)
 
 
 @compiled

@@ -1,75 +1,69 @@
 # Copyright 2026 adversarial_lcd_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Certificates as a table and as a picture."""
+"""Certificates in words and cells, for the terminal and the page."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import matplotlib
-from matplotlib.figure import Figure
-import numpy as np
-
+from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.certificates.run import CLASSES
-from adversarial_lcd_ros.evaluation.page import GRID, STYLE, WIDE, attack_colour, svg
 from adversarial_lcd_ros.registry import NONE
 
-_HEIGHT = 2.6  # inches, of a sequence
-_DASHES = ('-', '--', ':', '-.')
 Row = Mapping[str, Any]
+Lines = list[dict[str, str]]
 
 
 def name_of(row: Row) -> str:
     """Return the detector of a row in a few words."""
-    parts = [row['target']]
-    if row['defences'] != NONE:
-        parts.append(row['defences'])
-    if row['geometric_check']:
-        parts.append('geometric_check')
-    return ', '.join(parts)
+    return ', '.join(filter(None, (
+        row['target'], row['defences'] if row['defences'] != NONE else '', row['changed'])))
 
 
-def certificate_table(rows: Sequence[Row]) -> str:
-    """Return how many frames are certified, by flips, as a Markdown table."""
+def shown_flips(rows: Iterable[Row]) -> list[int]:
+    """Return for how many flips tables have a column, 0 left out."""
     budget = max(row['budget'] for row in rows)
-    shown = sorted({0, 1, *(flips for flips in (3, 9) if flips < budget), budget})
-    head = ['sequence', 'detector', 'class', 'frames',
-            *(f'{flips} flips' if flips else 'right' for flips in shown)]
-    lines = [head, ['---'] * len(head)]
-    for row in rows:
-        for name in CLASSES:
-            found = row['classes'][name]
-            lines.append([row['sequence'], f'`{name_of(row)}`', name, str(found['frames']),
-                          *(_cell(found, flips) for flips in shown)])
-    return ''.join(f'| {" | ".join(line)} |\n' for line in lines)
+    return sorted({1, *(flips for flips in (3, 9) if flips < budget), budget})
 
 
-def _cell(found: Mapping[str, Any], flips: int) -> str:
+def certified_lines(rows: Sequence[Row]) -> Lines:
+    """Return how many frames of each class are right, and certified by flips."""
+    return [{'sequence': row['sequence'], 'labels': row['told_by'],
+             'detector': f'`{name_of(row)}`', 'class': name, 'frames': str(found['frames']),
+             'right': str(found['right']),
+             **{_flips(flips): _count(found, flips) for flips in shown_flips(rows)}}
+            for row in rows for name in CLASSES for found in [row['classes'][name]]]
+
+
+def accuracy_lines(rows: Sequence[Row]) -> Lines:
+    """Return the certified balanced accuracy by flips, and what a certificate costs."""
+    flips = shown_flips(rows)
+    return [{'sequence': row['sequence'], 'detector': f'`{name_of(row)}`',
+             **{_flips(number): _share(row, number) for number in (0, *flips)},
+             '95 % interval of the last': wording.interval(row['ci95'], 100.0)
+             or wording.UNDEFINED, 'ms a frame': wording.number(row['certify_ms'], 0)}
+            for row in rows]
+
+
+def markdown(lines: Lines) -> str:
+    """Return rows of heading to cell as a Markdown table."""
+    table = [list(lines[0]), ['---'] * len(lines[0]), *(list(line.values()) for line in lines)]
+    return ''.join(f'| {" | ".join(line)} |\n' for line in table)
+
+
+def _flips(number: int) -> str:
+    return 'no flip' if not number else f'{number} flip{"s" if number > 1 else ""}'
+
+
+def _count(found: Row, flips: int) -> str:
     if not found['frames'] or flips >= len(found['certified']):
-        return '-'
+        return wording.UNDEFINED
     count = found['certified'][flips]
-    return f'{count} ({count / found["frames"]:.0%})'
+    return f'{count} ({wording.percent(count / found["frames"], 0)})'
 
 
-def draw_certificates(rows: Sequence[Row]) -> bytes:
-    """Draw the certified share by the number of flips, a line for each detector; SVG."""
-    sequences = list(dict.fromkeys(row['sequence'] for row in rows))
-    names = list(dict.fromkeys(name_of(row) for row in rows))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _HEIGHT * len(sequences) + 0.4), layout='constrained')
-        panels = figure.subplots(len(sequences), len(CLASSES), squeeze=False, sharey=True)
-        for panel_row, sequence in zip(panels, sequences, strict=True):
-            for axes, kind in zip(panel_row, CLASSES, strict=True):
-                for row in (row for row in rows if row['sequence'] == sequence):
-                    found, place = row['classes'][kind], names.index(name_of(row))
-                    share = np.array(found['certified']) / max(found['frames'], 1)
-                    axes.plot(share, label=name_of(row), drawstyle='steps-post',
-                              color=attack_colour(place), linestyle=_DASHES[place % 4])
-                axes.set(title=f'{sequence}: {kind}', ylim=(-0.02, 1.02), xlabel='flips',
-                         ylabel='certified' if axes is panel_row[0] else '')
-                axes.grid(color=GRID, linewidth=0.6)
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc='outside lower center', ncols=3)
-        return svg(figure)
+def _share(row: Row, flips: int) -> str:
+    return wording.percent(row['accuracy'][flips]) if flips < len(row['accuracy']) \
+        else wording.UNDEFINED

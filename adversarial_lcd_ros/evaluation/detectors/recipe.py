@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ from adversarial_lcd_ros.evaluation.recipes import load_yaml
 from adversarial_lcd_ros.registry import TARGETS
 
 ConfigT = TypeVar('ConfigT', bound=Config)
-_KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels')
+_KEYS = ('source', 'scored', 'nodes', 'targets', 'builder', 'lcd', 'labels', 'detectors')
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,9 @@ class TargetSequence:
     targets : tuple of str
     scored : (float, float)
         From and to which fraction of the frames queries are scored; earlier ones are map only.
+    detectors : tuple of LcdConfig
+        Every target is evaluated with each of them; ``lcd`` with further settings, such as
+        defences.
 
     """
 
@@ -45,6 +48,7 @@ class TargetSequence:
     nodes: tuple[int, ...]
     targets: tuple[str, ...]
     scored: tuple[float, float] = (0.0, 1.0)
+    detectors: tuple[LcdConfig, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,7 @@ class Choices:
     labels: Mapping[str, Any]
     nodes: tuple[int, ...] = ()
     targets: tuple[str, ...] = ()
+    defences: tuple[str, ...] = ()
 
 
 def named_sequences(sources: Sequence[str], choices: Choices) -> list[TargetSequence]:
@@ -108,9 +113,22 @@ def _sequence(source: str, entry: Mapping[str, Any], choices: Choices) -> Target
             TARGETS.check(target)
         except ConfigError as error:
             raise ConfigError(f'{source}: {error}') from error
-    return TargetSequence(source, builder, _merged(LcdConfig, entry.get('lcd'), choices.lcd),
+    lcd = _merged(LcdConfig, entry.get('lcd'), choices.lcd)
+    return TargetSequence(source, builder, lcd,
                           _merged(LabelConfig, entry.get('labels'), choices.labels), nodes,
-                          targets, _part(source, entry.get('scored', (0, 1))))
+                          targets, _part(source, entry.get('scored', (0, 1))),
+                          _detectors(source, lcd, entry.get('detectors'), choices))
+
+
+def _detectors(source: str, lcd: LcdConfig, own: Any, choices: Choices) -> tuple[LcdConfig, ...]:
+    """Return the settings of the detector, one for each row of a target and protocol."""
+    entries = [{'defences': names} for names in choices.defences] or own or [{}]
+    if not isinstance(entries, list) or not all(
+            isinstance(entry, dict) and 'target' not in entry for entry in entries):
+        raise ConfigError(f'{source}: detectors {own!r}: expected a list of settings of the '
+                          'detector, such as [{}, {defences: length_check}]')
+    return tuple(dict.fromkeys(LcdConfig.from_mapping({**asdict(lcd), **entry, **choices.lcd})
+                               for entry in entries))
 
 
 def _part(source: str, value: Any) -> tuple[float, float]:

@@ -52,7 +52,7 @@ from adversarial_lcd_ros.training.model_folder import trained_on
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 
 # Of the row's columns; a change in the code below makes rows again by itself.
-KIND, SCHEMA = 'targets', 4
+KIND, SCHEMA = 'targets', 5
 _CODE = ('lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
          'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
          'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
@@ -147,7 +147,8 @@ def run_target(task: TargetTask) -> tuple[str, Row]:
     references_trained_on, geometric_check, defences, changed, labels, labels_changed, told_by,
     positives, negatives, balanced_accuracy, ci95, average_precision, recall_at_100_precision,
     mcc, precision, recall``, and ``n_pairs, distinct_pairs, seeds`` or ``n_frames, wrong_matches,
-    untold_matches, declared_elsewhere, latency_to_first_closure_s``; labels are settings.
+    untold_matches, declared_elsewhere, latency_to_first_closure_s``, ``outcomes``, those of all
+    frames between commas, and ``block``, the frames of one of the interval; labels are settings.
     Undefined figures are None, so all of a sequence without pairs of a class.
     """
     figures = _pairs(task) if task.protocol == 'pairs' else _live(task)
@@ -224,13 +225,14 @@ def _live(task: TargetTask) -> Row:
     probability = np.array([decision.probability for decision in run.decisions])
     metrics = measure(labels.kind, is_loop, probability, correct, told)
     outcome = outcomes(labels.kind, is_loop, correct, told)
+    block = intervals.block_frames(labels.stamp_ns)
     interval = intervals.balanced_accuracy_interval(
-        told_kind(labels.kind, outcome), right(outcome),
-        intervals.block_frames(labels.stamp_ns), seed=0)
+        told_kind(labels.kind, outcome), right(outcome), block, seed=0)
     return {**_figures(metrics), 'n_frames': len(match), 'wrong_matches': metrics.wrong_matches,
             'untold_matches': metrics.untold_matches,
             'declared_elsewhere': int((is_loop & (match_is == ELSEWHERE)).sum()),
             'ci95': list(interval) if interval else None,
+            'outcomes': ','.join(outcome.tolist()), 'block': block,
             'latency_to_first_closure_s': first_closure_latency_s(
                 labels.stamp_ns, labels.kind, outcome)}
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
+from adversarial_lcd_ros.evaluation.detectors.defended import defended_table, settings_of
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.registry import NONE, TARGETS
 
@@ -31,12 +32,16 @@ def target_tables(rows: Iterable[Row]) -> str:
         if not chosen:
             continue
         names = list(dict.fromkeys(row['sequence'] for row in chosen))
+        settings = list(dict.fromkeys(map(settings_of, chosen)))
         chosen.sort(key=lambda row: (names.index(row['sequence']), row['nodes'],
+                                     settings.index(settings_of(row)),
                                      order.get(row['target'], own), row['target']))
         lines = [_line(('sequence', 'n', 'target', *head)), _line(['---'] * (len(head) + 3))]
-        for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'])):
+        for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'],
+                                                         settings_of(row))):
             lines += _group_lines(list(group))
         parts.append('\n'.join(lines))
+    parts += defended_table(rows)
     return '\n\n'.join(parts) + '\n'
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
+from adversarial_lcd_ros.evaluation.kinds.certificates import CertificatesResults
 from adversarial_lcd_ros.evaluation.kinds.frames import FramesResults
 from adversarial_lcd_ros.evaluation.kinds.labels import LabelsResults
 from adversarial_lcd_ros.evaluation.kinds.maps import MapResults
@@ -31,7 +32,7 @@ from adversarial_lcd_ros.evaluation.results import (
 
 KINDS: Mapping[str, ResultsKind] = {kind.name: kind for kind in (
     ReplayResults(), FramesResults(), TargetsResults(), LabelsResults(), MapResults(),
-    RingsResults())}
+    RingsResults(), CertificatesResults())}
 
 
 def is_results(path: Path) -> bool:
