@@ -38,3 +38,18 @@ def shared_cases():
     if not path.is_dir():
         pytest.skip(f'{path} is not on this machine')
     return path
+
+
+@pytest.fixture
+def kept_runs(monkeypatch):
+    """Return the recordings of replays by name of the run: those of the test, once they ran."""
+    from adversarial_lcd_ros.evaluation.replay.replays import Replays
+    runs, replay = {}, Replays.run
+
+    def replay_and_keep(self):
+        made, earlier_s = replay(self)
+        runs.update(made)
+        return made, earlier_s
+
+    monkeypatch.setattr(Replays, 'run', replay_and_keep)
+    return runs

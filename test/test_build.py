@@ -18,7 +18,8 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import EvaluationError, ModelError, SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
-from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+from adversarial_lcd_ros.evaluation.replay.plan import Plan
+from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.graph_sequences.bags import build_graph_bag
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.paths import share_path

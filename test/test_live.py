@@ -16,11 +16,12 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
-from adversarial_lcd_ros.evaluation.replay import run as live
+from adversarial_lcd_ros.evaluation.replay import replays
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
-from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.messages.types import AttackReport
 from adversarial_lcd_ros.paths import share_path
 
@@ -42,19 +43,10 @@ def tour():
     return share_path('bags/flat_tour')
 
 
-def test_wire_and_offline_agree_decision_by_decision(tour, tmp_path, monkeypatch):
+def test_wire_and_offline_agree_decision_by_decision(tour, tmp_path, kept_runs):
     attacks = {
         'recall': AttackConfig(search='recall', max_queries=8),
         'paper': AttackConfig(queries_per_edit=1, max_queries=6)}
-    runs = {}
-    replay = live.Replays.run
-
-    def replay_and_keep(self):
-        made, earlier_s = replay(self)
-        runs.update(made)
-        return made, earlier_s
-
-    monkeypatch.setattr(live.Replays, 'run', replay_and_keep)
     folder, summary = evaluate_live(
         tour, tmp_path / 'results', Plan(NO_NETWORK, LcdConfig(), LabelConfig(), THIN, attacks))
 
@@ -69,15 +61,15 @@ def test_wire_and_offline_agree_decision_by_decision(tour, tmp_path, monkeypatch
     assert json.loads((folder / 'summary.json').read_text())['frames'] == 60
     assert summary['graphs_rebuilt_differently'] == {'recall': 0, 'paper': 0}
 
-    clean = runs['clean']
+    clean = kept_runs['clean']
     assert run_offline(clean.clean, LcdConfig())[0].decisions == clean.decisions
     for name, attack in attacks.items():
         offline, forwarded = run_offline(clean.clean, LcdConfig(), attack)
-        assert forwarded == runs[name].forwarded
-        assert offline.decisions == runs[name].decisions
+        assert forwarded == kept_runs[name].forwarded
+        assert offline.decisions == kept_runs[name].decisions
         assert ([(report.status, report.edits, report.queries) for report in offline.reports]
                 == [(report.status, report.edits, report.queries)
-                    for report in runs[name].reports])
+                    for report in kept_runs[name].reports])
 
 
 def test_a_node_that_fails_is_told_with_its_own_words(tour, tmp_path):
@@ -98,14 +90,14 @@ GRAPH = make_graph(60)
 ])
 def test_a_lost_message_fails_the_run(run, said):
     with pytest.raises(EvaluationError, match=said):
-        live._check('attack', run, 1)
+        replays._check('attack', run, 1)
 
 
 def test_an_attacker_over_budget_fails_the_run():
     report = AttackReport(0, '', 0, 'success', edit_budget=1)
     run = Recording([GRAPH], [GRAPH.flip([(0, 5), (1, 5)])], [None], [report])
     with pytest.raises(EvaluationError, match='budget of 1'):
-        live._check('attack', run, 1)
+        replays._check('attack', run, 1)
 
 
 def test_the_recipe_that_ships_and_what_overrides_it():

@@ -18,8 +18,10 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay import run as live
+from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
-from adversarial_lcd_ros.evaluation.replay.run import Plan, Replays, evaluate_live
+from adversarial_lcd_ros.evaluation.replay.replays import Replays
+from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.evaluation.wording import headline, meaning
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
 from adversarial_lcd_ros.paths import share_path
@@ -87,24 +89,15 @@ def test_a_bag_of_graphs_has_no_pictures_for_a_poster(tmp_path):
         live._without_builder(tmp_path, plan('p', {'p': HUNG}), str)
 
 
-def test_a_poster_hangs_in_its_run_alone(tmp_path, monkeypatch):
+def test_a_poster_hangs_in_its_run_alone(tmp_path, kept_runs):
     pytest.importorskip('rclpy', reason='rclpy is not installed')
-    runs = {}
-    replay = live.Replays.run
-
-    def replay_and_keep(self):
-        made, earlier_s = replay(self)
-        runs.update(made)
-        return made, earlier_s
-
-    monkeypatch.setattr(live.Replays, 'run', replay_and_keep)
     folder, summary = evaluate_live(share_path('bags/flat_tour'), tmp_path, plan(
         'pa', {'p': HUNG}))
-    clean = runs['clean'].clean
+    clean = kept_runs['clean'].clean
     changed = [(graph.stamp_ns - clean[0].stamp_ns) // 10**9
-               for graph, other in zip(clean, runs['p'].clean, strict=True) if graph != other]
+               for graph, other in zip(clean, kept_runs['p'].clean, strict=True) if graph != other]
     assert changed == [6, 18]  # of a frame each two seconds
-    assert runs['a'].clean == clean
+    assert kept_runs['a'].clean == clean
     assert summary['graphs_rebuilt_differently'] == {'a': 0}
     assert json.loads((folder / 'configuration.json').read_text())['posters'] == {'p': HUNG}
     row = json.loads((folder / 'summary.json').read_text())['rows'][1]

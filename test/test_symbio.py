@@ -13,7 +13,8 @@ import pytest
 
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.errors import GraphError
-from adversarial_lcd_ros.evaluation.replay.run import Plan, evaluate_live
+from adversarial_lcd_ros.evaluation.replay.plan import Plan
+from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.graph import SCENE_CLASS
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, write_graphs
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence

@@ -42,7 +42,7 @@ from adversarial_lcd_ros.settings import (
 from adversarial_lcd_ros.start import ros_problem
 
 if TYPE_CHECKING:
-    from adversarial_lcd_ros.evaluation.replay.run import Plan
+    from adversarial_lcd_ros.evaluation.replay.plan import Plan
 
 RECIPE = 'quick'
 DEMO_BAG = 'bags/flat_tour'
@@ -159,8 +159,8 @@ def _plan(options: Namespace) -> Plan:
     if options.map:
         maps.check(options)
 
+    from adversarial_lcd_ros.evaluation.replay.plan import Plan
     from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
-    from adversarial_lcd_ros.evaluation.replay.run import Plan
     from adversarial_lcd_ros.lcd.targets import builder_for
 
     attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
