@@ -18,11 +18,11 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay import run as live
+from adversarial_lcd_ros.evaluation.replay.findings import headline, meaning
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
-from adversarial_lcd_ros.evaluation.wording import headline, meaning
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
 from adversarial_lcd_ros.paths import share_path
 from adversarial_lcd_ros.sequences import open_sequence

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.evaluation import results, wording
 from adversarial_lcd_ros.evaluation.methods import whose
 from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
-from adversarial_lcd_ros.evaluation.replay import report
+from adversarial_lcd_ros.evaluation.replay import findings, report, tables
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
@@ -124,7 +124,7 @@ def test_an_untold_match_is_in_no_figure_and_is_said():
     assert attack['declared_elsewhere'] == 2
     assert attack['decline_pp'] == pytest.approx(50 * (6 / 29 + 1 / 22))
     assert found['told_by'] == 'audit'
-    assert '1 frame was left out' in wording.headline(found)
+    assert '1 frame was left out' in findings.headline(found)
 
 
 def test_records_survive_the_file(records, tmp_path):
@@ -269,21 +269,21 @@ def test_report_without_attacks(records, folder):
 
 
 def test_headline_is_careful(summary):
-    assert 'took' in wording.headline(summary)
+    assert 'took' in findings.headline(summary)
     nothing = {**summary, 'attacks': summary['attacks'][1:]}
-    assert wording.headline(nothing).startswith('No attack lowered')
+    assert findings.headline(nothing).startswith('No attack lowered')
 
 
 def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
     eigen, walk = summary['attacks']
     ours = {**walk, 'name': 'recall', 'search': 'recall', 'perturbation': '',
             'decline_pp': 20.0, 'decline_ci95': (9.0, 30.0)}
-    text = wording.headline({**summary, 'attacks': [eigen, ours]})
+    text = findings.headline({**summary, 'attacks': [eigen, ours]})
     assert "The attack recall, this project's own, took 20.0 points" in text
     assert f"The paper's own (eigen) took {wording.points(eigen['decline_pp'])} points" in text
-    assert "The attack eigen, the paper's, took" in wording.headline(summary)
+    assert "The attack eigen, the paper's, took" in findings.headline(summary)
     unsure = {**ours, 'decline_ci95': (0.0, 30.0)}
-    text = wording.headline({**summary, 'attacks': [eigen, unsure]})
+    text = findings.headline({**summary, 'attacks': [eigen, unsure]})
     assert "The strongest, recall, this project's own, changed it" in text
     assert "The paper's own (eigen) took" in text
 
@@ -312,14 +312,14 @@ def test_a_check_behind_the_detector_takes_loops_back(records):
     assert (eigen['invented'], eigen['fp'], eigen['wrong_matches']) == (0, 0, 0)
     assert eigen['suppressed'] == found['attacks'][0]['suppressed']  # one wrong match among them
     assert found['detector'] == {'target': 'wl', 'threshold': 0.5, 'defences': []}
-    assert wording.behind_rows(found)[0]['invented'] == '0 of 22'
-    assert any('geometric check' in text for text in wording.meaning(found))
+    assert tables.behind_rows(found)[0]['invented'] == '0 of 22'
+    assert any('geometric check' in text for text in findings.meaning(found))
 
 
 def test_without_the_check_asked_there_are_no_rows_of_it(summary):
     assert summary['behind_check'] is None
-    assert wording.behind_rows(summary) == []
-    assert not any('geometric check' in text for text in wording.meaning(summary))
+    assert tables.behind_rows(summary) == []
+    assert not any('geometric check' in text for text in findings.meaning(summary))
 
 
 def test_the_check_is_asked_of_the_graphs_that_the_detector_got(records):
@@ -443,12 +443,12 @@ def test_with_ground_truth_changes_are_counted_as_well(summary):
 
 
 def test_the_headline_without_ground_truth_claims_no_accuracy(bare):
-    text = wording.headline(bare)
+    text = findings.headline(bare)
     assert '30 loops in 60 frames' in text
     assert 'changed 7 decisions' in text
     assert 'Without ground truth nobody can say' in text
     assert 'accuracy' not in text
-    assert 'nobody can say' in wording.headline({**bare, 'attacks': []})
+    assert 'nobody can say' in findings.headline({**bare, 'attacks': []})
 
 
 def test_no_attack_that_could_be_made_is_no_rate(bare_records):
@@ -459,7 +459,7 @@ def test_no_attack_that_could_be_made_is_no_rate(bare_records):
     found = summarise('walks', records, {'eigen': AttackConfig()},
                       GraphStatistics.of([0] * COUNT, [0] * COUNT), seed=1)
     assert found['attacks'][0]['success_rate'] is None
-    assert wording.headline(found).startswith('All 60 graphs of walks are empty')
+    assert findings.headline(found).startswith('All 60 graphs of walks are empty')
 
 
 def test_the_report_without_ground_truth_says_what_is_missing(bare, bare_records, tmp_path):

@@ -185,10 +185,10 @@ def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
 
 def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     """Print the tables and the main finding of an evaluation."""
+    from adversarial_lcd_ros.evaluation.replay.findings import headline, is_labelled
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
     from adversarial_lcd_ros.evaluation.replay.tables import sweep_table
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
-    from adversarial_lcd_ros.evaluation.wording import headline, is_labelled
 
     made = maps.make([folder], options) if options.map else None
     if options.json:

@@ -14,6 +14,7 @@ from adversarial_lcd_ros.evaluation.paper.headline import headline
 from adversarial_lcd_ros.evaluation.paper.summaries import ATTACK, Summary, summarise_methods
 from adversarial_lcd_ros.evaluation.paper.tables import main_ratio
 from adversarial_lcd_ros.evaluation.paper.titles import full_title, usual_settings, usual_title
+from adversarial_lcd_ros.evaluation.replay.findings import is_labelled
 
 Rows = list[dict[str, str]]
 ARROW = '→'
@@ -30,7 +31,7 @@ def replay_lines(summary: Mapping[str, Any]) -> tuple[str, Rows]:
 
     """
     name, attacks = summary['sequence'], summary['attacks']
-    if not wording.is_labelled(summary):
+    if not is_labelled(summary):
         return (f'Decisions changed on {name}, which has no ground truth: {summary["frames"]} '
                 'frames', [{**_effort(attack, wording.attack_title(attack)),
                             'changed': str(attack['changed']),

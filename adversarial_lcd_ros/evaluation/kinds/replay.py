@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
-from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.kinds.base import (
     INTERVAL,
     NUMBER,
@@ -21,8 +20,10 @@ from adversarial_lcd_ros.evaluation.kinds.base import (
     check_columns,
 )
 from adversarial_lcd_ros.evaluation.maps.report import map_sections
+from adversarial_lcd_ros.evaluation.replay.findings import is_labelled
 from adversarial_lcd_ros.evaluation.replay.report import report_folder
 from adversarial_lcd_ros.evaluation.replay.summary import KIND, SCHEMA, from_document
+from adversarial_lcd_ros.evaluation.replay.tables import decline_rows, figure_rows
 from adversarial_lcd_ros.evaluation.results import SUMMARY
 
 _SEQUENCE: Columns = {'sequence': str, 'frames': int, 'positives': NUMBER, 'negatives': NUMBER,
@@ -68,9 +69,9 @@ class ReplayResults(ResultsKind):
         """Return the tables that "evaluate" prints."""
         summary = from_document(results.summary)
         return [FigureTable(f'The detector on {summary["sequence"]}',
-                            wording.figure_rows(summary)),
-                FigureTable('Decline in balanced accuracy' if wording.is_labelled(summary)
-                            else 'Decisions changed', wording.decline_rows(summary))]
+                            figure_rows(summary)),
+                FigureTable('Decline in balanced accuracy' if is_labelled(summary)
+                            else 'Decisions changed', decline_rows(summary))]
 
     def figures(self, results: Results) -> list[Figure]:
         """Return the figures of every run."""

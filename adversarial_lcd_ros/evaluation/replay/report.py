@@ -17,7 +17,7 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.page import NARROW, WIDE, data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import Picture, read_pictures, write_pictures
-from adversarial_lcd_ros.evaluation.replay import plots
+from adversarial_lcd_ros.evaluation.replay import findings, plots, tables
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,
     QueryRecord,
@@ -124,14 +124,14 @@ def _render(folder: Path, summary: Mapping[str, Any], records: Sequence[QueryRec
     threshold = float(detector['threshold'])
     curve = plots.decline_over_threshold(clean, attacks, threshold)
     values = {
-        'summary': summary, 'strongest': wording.strongest(summary), 'wording': wording,
-        'headline': wording.headline(summary),
+        'summary': summary, 'strongest': findings.strongest(summary), 'wording': wording,
+        'headline': findings.headline(summary),
         'detector': wording.detector_title(summary.get('detector')),
-        'meaning': wording.meaning(summary), 'behind_rows': wording.behind_rows(summary),
+        'meaning': findings.meaning(summary), 'behind_rows': tables.behind_rows(summary),
         'check': detector,
-        'labelled': wording.is_labelled(summary),
-        'decline_rows': wording.decline_rows(summary),
-        'figure_rows': wording.figure_rows(summary),
+        'labelled': findings.is_labelled(summary),
+        'decline_rows': tables.decline_rows(summary),
+        'figure_rows': tables.figure_rows(summary),
         'curve': None if curve is None else data_uri(curve, 'svg+xml'),
         'timeline_wide': data_uri(plots.timeline(clean, attacks, threshold, WIDE),
                                   'svg+xml'),
@@ -159,7 +159,7 @@ def _detector_values(configuration: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _sample(summary: Mapping[str, Any]) -> list[tuple[str, int, float]]:
-    if not wording.is_labelled(summary):
+    if not findings.is_labelled(summary):
         return []
     counts = {'positive': summary['positives'], 'negative': summary['negatives'],
               **summary['not_scored']}

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.attack.images.posting import Posting
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.evaluation.pictures import Picture
+from adversarial_lcd_ros.evaluation.replay.findings import strongest
 from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, runs_of
-from adversarial_lcd_ros.evaluation.wording import strongest
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.vision.draw import draw_attack
