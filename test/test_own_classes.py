@@ -20,6 +20,7 @@ from adversarial_lcd_ros.registry import PERTURBATIONS, SEARCHES, TARGETS
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / 'docs/extending.md').read_text(encoding='utf-8')
 LAB = '\n\n'.join(re.findall(r'```python\n(.*?)```', PAGE, re.S))
+RECIPE, = re.findall(r'```yaml\n(.*?)```', PAGE, re.S)
 WRONG = '''
 class Nothing(Search):
     """Gives up."""
@@ -125,6 +126,20 @@ def test_a_target_is_trained_measured_behind_a_defence_and_attacked(tmp_path, co
         assert rows['stepwiselab.mine:Degreeedges']['edits_mean'] > 0
         losses.append([frame['loss_after'] for frame in rows['optimumedges']['frame_results']])
     assert losses[0] != losses[1]  # the yardstick sees the defence
+
+
+def test_a_defence_gets_onto_the_leaderboard(tmp_path, command):
+    recipe = tmp_path / 'mine.yaml'
+    recipe.write_text(RECIPE.replace('defaults:\n', 'defaults:\n  nodes: 20\n'))
+    command('evaluate', '--recipe', recipe, '--frames', '2', '--ratio', '0.02', '--max-queries',
+            '8', '--output', tmp_path / 'rings')
+    found = summary(tmp_path / 'rings')
+    assert {row['defence'] for row in found['worst']} == {
+        'none', 'length_check', 'lab.mine:DropsLongEdges'}
+    attacks = {(row['attack'], row['defence']) for row in found['rows']}
+    assert ('recall, unaware', 'lab.mine:DropsLongEdges') in attacks
+    assert ('optimum', 'lab.mine:DropsLongEdges') in attacks
+    assert 'lab.mine:DropsLongEdges' in (tmp_path / 'rings/report.html').read_text()
 
 
 @pytest.mark.parametrize(('settings', 'said'), [
