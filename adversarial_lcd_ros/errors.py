@@ -12,10 +12,11 @@ def with_suggestions(unknown: Iterable[object], known: Iterable[str]) -> str:
     names = list(known)
     words = []
     for name in map(str, unknown):
-        close = difflib.get_close_matches(name, names, 1)
+        # Cut short, or else misspelt.
+        begun = [each for each in names if each.startswith(name)] if name.strip('-') else []
+        close = begun[:1] or difflib.get_close_matches(name, names, 1)
         words.append(f'{name} (did you mean {close[0]}?)' if close else name)
     return ', '.join(words)
-
 
 
 class AdversarialLcdError(Exception):

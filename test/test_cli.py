@@ -175,6 +175,7 @@ def test_import_reports_what_it_wrote(tmp_path, capsys):
     (['evalute', 'bag'], 'there is no command evalute (did you mean evaluate?); there are: demo,'),
     (['demo', '--retio', '1e-4'], 'unknown: --retio (did you mean --ratio?)'),
     (['evaluate', 'bag', '--lcd-tresholt', '1'], '(did you mean --lcd-threshold?)'),
+    (['evaluate', 'bag', '--nodes', '20'], 'unknown: --nodes (did you mean --nodes-moved?)'),
     (['params', '--lcd-target', 'wl'], 'unknown: --lcd-target'),
 ])
 def test_a_slip_of_the_pen_is_told_what_was_meant(arguments, meant, capsys):

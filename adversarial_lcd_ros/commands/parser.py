@@ -38,7 +38,15 @@ _INVALID_CHOICE = re.compile(r"argument COMMAND: invalid choice: '([^']*)'.*", r
 
 
 class Parser(ArgumentParser):
-    """A parser that says which command or option may have been meant."""
+    """
+    A parser that says which command or option may have been meant.
+
+    It does not guess: an option cut short, such as --node, may be that of another setting today
+    than the one it was meant for.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{'allow_abbrev': False, **options})
 
     def parse_args(self, args: Sequence[str] | None = None,  # type: ignore[override]
                    namespace: Namespace | None = None) -> Namespace:
