@@ -245,7 +245,7 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     assert ', or refused 100 %' in report
     assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [
         'sealed graphs', 'rederive', 'none']
-    assert 'or 100.0 % where a refusal counts as an attack that failed' in report
+    assert '100.0 % are left, refusals, with an alarm each, counted as attacks that' in report
     assert 'Sealed graphs: builder and detector share a key.' in report
     # A folder from before there were seals and counts.
     old = tmp_path / 'old'

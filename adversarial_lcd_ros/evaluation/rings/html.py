@@ -71,11 +71,10 @@ def headline(ranks: Sequence[Rank]) -> str:
 
 
 def _left(rank: Rank, place: int) -> str:
-    left = f'{wording.percent(rank.held[place])} are left'
+    left = f'{wording.percent(rank.unharmed[place])} are left'
     if rank.unharmed[place] == rank.held[place]:
         return left
-    return (f'{left}, or {wording.percent(rank.unharmed[place])} where a refusal counts as an '
-            'attack that failed')
+    return f'{left}, refusals, with an alarm each, counted as attacks that failed'
 
 
 def _over(sequences: int) -> str:
