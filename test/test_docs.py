@@ -22,7 +22,8 @@ MOST_WORDS = 1500
 OF_OTHER_PROGRAMS = {
     '--from-paths', '--ignore-src',  # rosdep
     '--params-file', '--ros-args', '--show-args', '--help',  # ROS
-    '--nthreads', '--only', '--scale', '--strict', '--upgrade'}  # dask, soak, mypy, lock
+    '--nthreads', '--only', '--scale', '--strict', '--upgrade',  # dask, soak, mypy, lock
+    '--stride'}  # benchmarks/live_ladder.py
 CODE = re.compile(r'```.*?```|`[^`]+`', re.S)
 COMMAND = re.compile(r'\badversarial-lcd ([a-z][a-z-]*)([^`\n]*)')
 OPTION = re.compile(r'(?<![\w-])--[a-z][\w-]*')
