@@ -32,6 +32,7 @@ from adversarial_lcd_ros.evaluation.certificates.run import (
     CertificateTask,
     certificate_tasks,
 )
+from adversarial_lcd_ros.evaluation.markdown import table
 from adversarial_lcd_ros.evaluation.streams import load_stream_graphs, open_streams
 from adversarial_lcd_ros.evaluation.workers import local_workers
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
@@ -74,7 +75,7 @@ def make_tasks(options: Namespace) -> Iterator[CertificateTask]:
                 yield from certificate_tasks(stream, lcd, options.budget, options.frames)
 
 
-def line(name: Name, frames: list[tuple[list[Gap], list[Gap]]]) -> str:
+def line(name: Name, frames: list[tuple[list[Gap], list[Gap]]]) -> list[str]:
     """Return a line of the table."""
     best = [gap for of, _ in frames for gap in of]
     drawn = [gap for _, of in frames for gap in of]
@@ -84,7 +85,7 @@ def line(name: Name, frames: list[tuple[list[Gap], list[Gap]]]) -> str:
     cells = [*name, str(len(frames)), str(len(best)), str(len(drawn)),
              f'{min(gap.inside for gap in every):.1e}',
              str(sum(not gap.kept for gap in every)), *loose]
-    return f'| {" | ".join(cells)} |'
+    return cells
 
 
 def main() -> None:
@@ -106,8 +107,7 @@ def main() -> None:
             for name, best, drawn in part:
                 found[name].append((best, drawn))
             progress(sum(map(len, found.values())), sum(len(task.frames) for task in tasks))
-    print(f'| {" | ".join(HEAD)} |', f'|{" --- |" * len(HEAD)}',
-          *(line(name, found[name]) for name in sorted(found)), sep='\n')
+    print(*table(HEAD, (line(name, found[name]) for name in sorted(found))), sep='\n')
     gaps = [gap for frames in found.values() for pair in frames for of in pair for gap in of]
     least = min((gap.inside for gap in gaps), default=0.0)
     print(f'\n{len(gaps)} comparisons; the smallest distance is {least:.1e}')

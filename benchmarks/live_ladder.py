@@ -34,6 +34,7 @@ from adversarial_lcd_ros.attack.images.posting import Posting
 from adversarial_lcd_ros.commands.common import progress_bar
 from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LcdConfig, ReplayConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError
+from adversarial_lcd_ros.evaluation.markdown import table
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.processes import (
@@ -42,7 +43,6 @@ from adversarial_lcd_ros.evaluation.replay.processes import (
     Setup,
     run_pipeline,
 )
-from adversarial_lcd_ros.evaluation.rings.page import table
 from adversarial_lcd_ros.evaluation.workers import local_workers
 from adversarial_lcd_ros.files.keys import make_key
 from adversarial_lcd_ros.paths import share_path

@@ -240,7 +240,7 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
             if entry.defence == 'none'} == {('wl', 0.0), ('symbio', 7.0)}
     (tmp_path / 'configuration.json').write_text('{"settings": []}')
     (tmp_path / 'environment.json').write_text('{"time_utc": "2026-01-02T03:04:05Z"}')
-    report = rings_html(tmp_path, summary).replace('\u202f', ' ')
+    report = rings_html(tmp_path, summary, b'').replace('\u202f', ' ')
     assert ', refused: age 1, replayed 1</small>' in report
     assert ', or refused 100 %' in report
     assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [

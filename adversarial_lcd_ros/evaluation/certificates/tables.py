@@ -10,6 +10,7 @@ from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.certificates.run import CLASSES
+from adversarial_lcd_ros.evaluation.markdown import table_of
 from adversarial_lcd_ros.registry import NONE
 
 Row = Mapping[str, Any]
@@ -49,8 +50,7 @@ def accuracy_lines(rows: Sequence[Row]) -> Lines:
 
 def markdown(lines: Lines) -> str:
     """Return rows of heading to cell as a Markdown table."""
-    table = [list(lines[0]), ['---'] * len(lines[0]), *(list(line.values()) for line in lines)]
-    return ''.join(f'| {" | ".join(line)} |\n' for line in table)
+    return '\n'.join((*table_of(lines), ''))
 
 
 def _flips(number: int) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from adversarial_lcd_ros.evaluation import intervals, wording
+from adversarial_lcd_ros.evaluation.markdown import table
 from adversarial_lcd_ros.evaluation.metrics import Outcomes, right, told_kind
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
@@ -40,8 +41,7 @@ def defended_table(rows: Sequence[Row]) -> list[str]:
     lines = [_cells(row, group) for group in groups.values() if len(group) > 1 for row in group]
     if not lines:
         return []
-    return ['\n'.join(f'| {" | ".join(line)} |' for line in (_HEAD, ['---'] * len(_HEAD),
-                                                              *lines))]
+    return ['\n'.join(table(_HEAD, lines))]
 
 
 def _cells(row: Row, group: Sequence[Row]) -> list[str]:

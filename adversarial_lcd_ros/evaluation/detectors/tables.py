@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from adversarial_lcd_ros.evaluation.detectors.defended import defended_table, settings_of
+from adversarial_lcd_ros.evaluation.markdown import table, table_line
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.registry import NONE, TARGETS
 
@@ -36,7 +37,7 @@ def target_tables(rows: Iterable[Row]) -> str:
         chosen.sort(key=lambda row: (names.index(row['sequence']), row['nodes'],
                                      settings.index(settings_of(row)),
                                      order.get(row['target'], own), row['target']))
-        lines = [_line(('sequence', 'n', 'target', *head)), _line(['---'] * (len(head) + 3))]
+        lines = table(('sequence', 'n', 'target', *head), ())
         for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'],
                                                          settings_of(row))):
             lines += _group_lines(list(group))
@@ -65,7 +66,7 @@ def _group_lines(group: Sequence[Row]) -> list[str]:
         elif row['references_trained_on']:
             name += ' (references seen in training)'
         first = (name, f'{row["nodes_mean"]:.0f}') if not place else ('', '')
-        lines.append(_line((*first, f'`{row["target"]}`', *_cells(row))))
+        lines.append(table_line((*first, f'`{row["target"]}`', *_cells(row))))
     return lines
 
 
@@ -93,7 +94,3 @@ def _pairs(row: Row) -> str:
 
 def _share(value: float | None) -> str:
     return '-' if value is None else f'{value:.3f}'
-
-
-def _line(cells: Iterable[str]) -> str:
-    return f'| {" | ".join(cells)} |'

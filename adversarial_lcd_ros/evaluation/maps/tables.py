@@ -18,6 +18,7 @@ from adversarial_lcd_ros.evaluation.maps.cases import (
     title_of,
 )
 from adversarial_lcd_ros.evaluation.maps.claims import QUANTILES
+from adversarial_lcd_ros.evaluation.markdown import table_of
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.wording import UNDEFINED, mean_count, number
@@ -132,13 +133,7 @@ def _claim_cells(row: Row) -> dict[str, str]:
 
 def markdown(tables: Sequence[Table]) -> str:
     """Return tables as Markdown, for a page."""
-    parts = []
-    for title, rows in tables:
-        heads = list(rows[0])
-        lines = [heads, ['---'] * len(heads), *([row[head] for head in heads] for row in rows)]
-        parts.append(f'### {title}\n\n' + ''.join(f'| {" | ".join(line)} |\n'
-                                                  for line in lines))
-    return '\n'.join(parts)
+    return '\n'.join('\n'.join((f'### {title}\n', *table_of(rows), '')) for title, rows in tables)
 
 
 def _runs(rows: Sequence[Row]) -> Iterator[Table]:

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.markdown import table, table_line, table_of
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
 from adversarial_lcd_ros.evaluation.paper.summaries import (
     ATTACK,
@@ -65,8 +66,7 @@ def _one_sided(rows: Sequence[dict[str, str]]) -> list[str]:
     if not rows:
         return []
     return ['Sequences without loops or without new places have no decline; what attacks did '
-            'there (means over the seeds):\n', _line(rows[0]), _line('---' for _ in rows[0]),
-            *(_line(row.values()) for row in rows), '']
+            'there (means over the seeds):\n', *table_of(rows), '']
 
 
 def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], usual: Summary
@@ -78,15 +78,14 @@ def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], u
     at = {(*(cell[name] for name in ATTACK), cell['sequence']): cell for cell in cells}
     head = [f'`{target}`', 'frames', 'edits', 'queries', *sequences, 'mean', 'of the optimum']
     lines = [f'Unless said otherwise: {usual_title(usual)}.\n',
-             _line(head), _line('---' for _ in head),
-             _line(['before', '', '', '', *(wording.percent(before.get(name))
-                                            for name in sequences), '', ''])]
+             *table(head, [['before', '', '', '', *(wording.percent(before.get(name))
+                                                    for name in sequences), '', '']])]
     for method in sorted(methods, key=lambda method: (
             is_yardstick(method), -method['decline_pp'])):
         key = tuple(method[name] for name in ATTACK)
         entries = [at.get((*key, name)) for name in sequences]
         share = method['share_of_optimum']
-        lines.append(_line([
+        lines.append(table_line([
             full_title(method, usual), _sample(entries), _count(method['edits_mean']),
             _count(method['queries_mean']), *map(_decline, entries),
             f'**{wording.points(method["decline_pp"])}**',
@@ -95,10 +94,6 @@ def _target(target: str, cells: Sequence[Summary], methods: Sequence[Summary], u
     if left_out:
         lines += ['', f'Without a figure, or without a graph that allows an edit: {left_out}.']
     return '\n'.join(lines) + '\n'
-
-
-def _line(texts: Iterable[str]) -> str:
-    return f'| {" | ".join(texts)} |'
 
 
 def _sample(entries: Sequence[Summary | None]) -> str:

@@ -14,7 +14,6 @@ from adversarial_lcd_ros.evaluation.page import data_uri, load_template
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import CONFIGURATION, ENVIRONMENT, read_json
 from adversarial_lcd_ros.evaluation.rings.page import SEALED, refused, unexplained
-from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
 from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS
 from adversarial_lcd_ros.evaluation.rings.tables import (
     Rank,
@@ -24,7 +23,7 @@ from adversarial_lcd_ros.evaluation.rings.tables import (
 )
 
 
-def rings_html(folder: Path, summary: Mapping[str, Any]) -> str:
+def rings_html(folder: Path, summary: Mapping[str, Any], curves: bytes) -> str:
     """
     Return the report of a results folder.
 
@@ -34,6 +33,8 @@ def rings_html(folder: Path, summary: Mapping[str, Any]) -> str:
         Has pictures, settings and environment of the run.
     summary : mapping
         The content of its summary.json.
+    curves : bytes
+        Its ``ring_curves``, SVG.
 
     """
     ranks = ranking(summary)
@@ -43,7 +44,7 @@ def rings_html(folder: Path, summary: Mapping[str, Any]) -> str:
                 else ''), levels=LEVELS, matrices=matrices(summary['rows']),
         posters=poster_table(summary['posters']) if summary['posters'] else None,
         sequences=list(dict.fromkeys(row['sequence'] for row in summary['rows'])),
-        curves=data_uri(ring_curves(summary), 'svg+xml'),
+        curves=data_uri(curves, 'svg+xml'),
         pictures=[(title, caption, data_uri(image, 'jpeg'))
                   for title, caption, image in read_pictures(folder)],
         configuration=read_json(folder / CONFIGURATION),

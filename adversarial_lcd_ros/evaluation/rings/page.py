@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adversarial_lcd_ros.evaluation import wording
+from adversarial_lcd_ros.evaluation.markdown import table
 from adversarial_lcd_ros.evaluation.rings.summaries import LEVELS, Summary
 from adversarial_lcd_ros.evaluation.rings.tables import (
     Matrix,
@@ -65,15 +66,6 @@ def rings_page(summary: Mapping[str, Any], command: str = '') -> str:
     if summary['posters']:
         parts += ['\n## A poster in two places\n', _POSTERS, '', *_posters(summary['posters'])]
     return '\n'.join(parts).lstrip('\n') + '\n'
-
-
-def table(headings: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a table in Markdown."""
-    return [_line(headings), _line(['---'] * len(headings)), *map(_line, lines)]
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f'| {" | ".join(cells)} |'
 
 
 def _leaderboard(board: Sequence[Standing]) -> list[str]:

@@ -156,11 +156,12 @@ def write_page(folder: Path, summary: Mapping[str, Any], command: str = '') -> P
         Of rings.md.
 
     """
-    write_bytes(folder / CURVES, ring_curves(summary))
+    curves = ring_curves(summary)
+    write_bytes(folder / CURVES, curves)
     path = folder / PAGE
     shown = ''.join(f'\n![{title}]({PICTURES}/{number:02d}.jpg)\n\n*{title}. {caption}*\n'
                     for number, (title, caption, _) in enumerate(read_pictures(folder), 1))
     write_text(path, f'{rings_page(summary, command)}\n![curves]({CURVES})\n{shown}')
     if (folder / CONFIGURATION).is_file() and (folder / ENVIRONMENT).is_file():
-        write_text(folder / REPORT, rings_html(folder, summary))
+        write_text(folder / REPORT, rings_html(folder, summary, curves))
     return path
