@@ -17,6 +17,7 @@ from adversarial_lcd_ros.errors import EvaluationError, SequenceError
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.files.keys import make_key
 from adversarial_lcd_ros.messages import codec
+from adversarial_lcd_ros.messages.types import AttackReport
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.frame import decode
 from adversarial_lcd_ros.sequences.replay import read_payloads
@@ -198,6 +199,46 @@ def test_a_missing_decision_is_named_by_its_stamp(ros, bag, tmp_path):
     with pytest.raises(EvaluationError, match=f'{STAMPS[3]} ns .*4 frames published, 3 decided'):
         node.work(ros.spin)
     assert not record.exists()  # a recording that looks whole is whole
+
+
+@pytest.mark.parametrize('late', ['graph_clean', 'graph', 'attack_report'])
+def test_a_recording_waits_for_what_comes_after_the_last_decision(ros, bag, tmp_path, late):
+    """Somebody is the whole pipeline; of the last frame, all but one message come in time."""
+    outputs = {topic: ros.publisher(topic) for topic in (
+        'graph_clean', 'graph', 'attack_report', 'loop_closures')}
+    held = []
+
+    def answer(message):
+        stamp_ns = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        graph = codec.encode_graph(make_graph(stamp_ns=stamp_ns))
+        payloads = {
+            'graph_clean': graph, 'graph': graph,
+            'attack_report': codec.encode_attack_report(
+                AttackReport(stamp_ns, 'camera', 0, 'skipped')),
+            'loop_closures': codec.encode_loop_closure(
+                codec.LoopClosure(stamp_ns, 'camera', 0, False, 0.0))}
+        for topic, payload in payloads.items():
+            if topic == late and stamp_ns == STAMPS[-1]:
+                held.append(wrap(payload))
+            else:
+                outputs[topic].publish(wrap(payload))
+
+    def spin(seconds):
+        others = outputs.keys() - {late}
+        if held and all(node.diagnostics[f'received {topic}'] == FRAMES for topic in others):
+            outputs[late].publish(held.pop())
+        return ros.spin(seconds)
+
+    ros.collect('image/compressed', answer, CompressedImage, raw=False)
+    # Both are in the middle of a pipeline: somebody hears them besides the recorder.
+    for topic in ('graph_clean', 'graph'):
+        ros.collect(topic, len)
+    record = tmp_path / 'record'
+    node = replay(ros, bag, lockstep=True, record=str(record))
+    assert node.work(spin) == 0
+    ros.stop(node)
+    assert {topic: sum(1 for _ in read_payloads(record, topic)) for topic in outputs} == (
+        dict.fromkeys(outputs, FRAMES))
 
 
 @pytest.mark.parametrize('record_frames', [True, False])

@@ -310,17 +310,24 @@ class BagReplayNode(PipelineNode):
             self._until_decided(1)
         else:
             self._until(self._all_sent)
-        if not self._recorder:
+        if not self._recorder or self._until(self._all_recorded):
             return
         count = self.diagnostics
-        if not self._until(lambda: not self._under_way
-                           and count['received graph'] >= self._decided
-                           and count[f'received {REPORTS}'] >= count[f'received {CLEAN}']):
-            text = (f'{self._published} frames, {count["received " + CLEAN]} clean graphs, '
-                    f'{count["received " + REPORTS]} attack reports, {self._decided} decisions')
-            if self._config.lockstep:
-                raise EvaluationError(f'the recording is incomplete: {text}')
-            self.get_logger().warning(f'frames were lost, as may be in real time: {text}')
+        text = (f'{self._published} frames, {count["received " + CLEAN]} clean graphs, '
+                f'{count["received " + FORWARDED]} graphs, {count["received " + REPORTS]} attack '
+                f'reports, {self._decided} decisions')
+        if self._config.lockstep:
+            raise EvaluationError(f'the recording is incomplete: {text}')
+        self.get_logger().warning(f'frames were lost, as may be in real time: {text}')
+
+    def _all_recorded(self) -> bool:
+        """Tell whether all messages are there of each frame that a decision is to come on."""
+        attacked = self._inputs[CLEAN].subscription is not None
+        # A decision may overtake what it is about: every topic has a path of its own.
+        answered = self._decided + self.diagnostics['refused by lcd']
+        return not self._under_way and all(
+            self.diagnostics[f'received {topic}'] >= answered
+            for topic in ((CLEAN, FORWARDED, REPORTS) if attacked else (FORWARDED,)))
 
     def _all_sent(self) -> bool:
         return all(publisher.wait_for_all_acked(Duration(seconds=0))
