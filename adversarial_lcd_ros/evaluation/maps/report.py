@@ -24,7 +24,6 @@ from adversarial_lcd_ros.evaluation.maps.tables import (
     count,
     is_main,
     markdown,
-    metres,
     run_title,
     stage_title,
     with_interval,
