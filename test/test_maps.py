@@ -21,6 +21,7 @@ from adversarial_lcd_ros.cli import main
 from adversarial_lcd_ros.config import BACK_ENDS, AttackConfig, LabelConfig, LcdConfig, MapConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation import results
+from adversarial_lcd_ros.evaluation.maps import plots
 from adversarial_lcd_ros.evaluation.maps.beside import read_beside
 from adversarial_lcd_ros.evaluation.maps.claims import claim_errors
 from adversarial_lcd_ros.evaluation.maps.inputs import has_metres, read_inputs
@@ -425,6 +426,12 @@ def test_a_map_is_shown_as_it_grows(folder, tmp_path, capsys, suffix):
 
 
 @needs_gtsam
+def test_a_map_is_worse_than_odometry_by_more_than_rounding():
+    case = {'back_ends': {'odometry': {'ate_m': 0.031}, 'same': {'ate_m': 0.0310004},
+                          'worse': {'ate_m': 0.033}, 'better': {'ate_m': 0.02}}}
+    assert [name for name in case['back_ends'] if plots.is_worse(case, name)] == ['worse']
+
+
 def test_maps_that_are_there_are_drawn_side_by_side(tmp_path, capsys):
     folder, still = replayed(tmp_path), tmp_path / 'map.png'
     assert main(['render', str(folder), '--output', str(still)]) == 2

@@ -127,11 +127,16 @@ def draw_map(panel: Any, one: Shown, back_end: str, axes: NDArray[np.int64]) -> 
         draw_false(panel, one.case['closures'], found['kept'], path)
     panel.plot(*path.T, color=ODOMETRY_COLOUR if is_odometry else MAP_COLOUR,
                linewidth=_MAP_WIDTH)
-    # Red where the robot would have been better off without any closure.
-    is_worse = found['ate_m'] > one.case['back_ends'][ODOMETRY]['ate_m']
     panel.set_xlabel(f'{metres(found["ate_m"])} m', fontsize=8.5,
-                     color=FALSE_COLOUR if is_worse else INK)
+                     color=FALSE_COLOUR if is_worse(one.case, back_end) else INK)
     fix_panel(panel, truth)
+
+
+def is_worse(case: Row, back_end: str) -> bool:
+    """Tell whether the robot would have been better off without any closure, by a millimetre."""
+    error, without = (case['back_ends'][name]['ate_m'] for name in (back_end, ODOMETRY))
+    # Without closures both are the same map, but for what rounding makes of it.
+    return bool(round(error - without, 3) > 0)
 
 
 def draw_false(panel: Any, closures: Sequence[Sequence[Any]], kept: Sequence[int],

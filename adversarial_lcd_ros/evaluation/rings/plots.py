@@ -108,7 +108,8 @@ def _over(rows: Sequence[Summary], what: str, kind: str) -> Lines:
 
 def _posters(rows: Sequence[Summary]) -> Lines:
     lines: Lines = defaultdict(dict)
-    for row in rows:
+    # Without a check first, as in the other columns: it has their colour.
+    for row in sorted(rows, key=lambda row: bool(row['check'] != 'none')):
         if row['control'] == SAME and row['count'] == 1 and row['kind'] == 'cells' and (
                 row['target'] == 'wl'):
             found = binomtest(row['to_poster'], row['pairs']).proportion_ci(method='wilson')
