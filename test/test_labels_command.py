@@ -45,6 +45,7 @@ def test_counts_path_and_pairs_are_written(sequence, tmp_path, monkeypatch):
     assert row['told_by'] == 'co-visibility'
     assert (row['positive'], row['negative'], row['no_candidate']) == (12, 4, 8)
     page = (out / 'report.html').read_text()
+    assert 'Of 24 frames, 12 show a place from before and 4 a new one' in page
     assert 'co-visibility' in page
     assert page.count('data:image/jpeg') == len(list(out.glob('*_*_*.jpg'))) == 10
     assert (out / 'positive_12_0.jpg').is_file()

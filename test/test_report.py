@@ -237,6 +237,9 @@ def test_report_needs_nothing_but_itself(folder):
     assert '@import' not in text
     assert 'url(' not in text
     assert '<script' not in text
+    # What is too wide for a tablet is scrolled, not the page.
+    assert text.count('<table class="cards">') == text.count(
+        '<div class="wide"><table class="cards">') > 0
     assert '<th>' not in text  # a screen reader is told what a heading is of
     assert sum(source.startswith('data:image/jpeg') for source in page.sources) == 6
     assert 'a & b' in page.text

@@ -62,25 +62,31 @@ def main_target(methods: Sequence[Summary]) -> str | None:
 
 def headline(methods: Sequence[Summary], ratio: float, cells: Sequence[Summary] = ()) -> str:
     """Return the main finding at a perturbation ratio, and what the paper's own attack took."""
+    return ''.join(findings(methods, ratio, cells))
+
+
+def findings(methods: Sequence[Summary], ratio: float,
+             cells: Sequence[Summary] = ()) -> tuple[str, str]:
+    """Return the main finding of ``headline``, and apart from it what belongs beside it."""
     here = [method for method in methods if method['ratio'] == ratio]
     target = main_target(here)
     best = strongest(here, target)
     if best is None:
         return ('No attack was measured on a sequence with both loops and new places.'
-                f'{_without_decline([cell for cell in cells if cell["ratio"] == ratio])}')
+                f'{_without_decline([cell for cell in cells if cell["ratio"] == ratio])}', '')
     count = len(best['sequences'])
     over = 'one sequence' if count == 1 else f'{count} sequences'
     title = f'{_name(best)}, {best["nodes"]} features'
     accuracy = (f'from {wording.percent(best["balanced_clean"])} to '
                 f'{wording.percent(best["balanced_attacked"])}')
     share = best['share_of_optimum']
-    yardstick = '' if share is None else (f' That is {wording.percent(share, 0)} of what the '
+    yardstick = '' if share is None else (f' It took {wording.percent(share, 0)} of what the '
                                           'greedy optimum over all flips takes.')
     papers = _papers_own(here, best)
     if best['decline_pp'] < TIE_PP:
         return (f'No black-box attack lowered the balanced accuracy of {target} on {over} at '
-                f'r = {ratio:g} and {_condition(best)}; the strongest was {title}, {accuracy}.'
-                f'{papers}')
+                f'r = {ratio:g} and {_condition(best)}; the strongest was {title}, {accuracy}.',
+                papers)
     bounds = best['ci95']
     doubt = (' One sequence says nothing about others.' if bounds is None else
              ' So few sequences leave open whether it holds on others.' if bounds[0] <= 0 else '')
@@ -88,7 +94,7 @@ def headline(methods: Sequence[Summary], ratio: float, cells: Sequence[Summary] 
     return (f'At r = {ratio:g} the strongest black-box attack on target {target} ({title})'
             f'{f", {owner}," if owner else ""} took {wording.points(best["decline_pp"])} points '
             f'of balanced accuracy on average over {over}{_interval(best)}, {accuracy}, at '
-            f'{_condition(best)}.{doubt}{yardstick}{papers}')
+            f'{_condition(best)}.{doubt}', f'{yardstick}{papers}')
 
 
 def papers_own(methods: Sequence[Summary]) -> Summary | None:

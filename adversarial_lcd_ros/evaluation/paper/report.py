@@ -91,7 +91,7 @@ def _values(rows: Sequence[Row], cells: Sequence[Summary],
     here = [method for method in methods if method['ratio'] == ratio]
     return {
         'wording': wording, 'count': _count, 'ratio': ratio,
-        'headline': headline.headline(methods, ratio, cells),
+        'findings': headline.findings(methods, ratio, cells),
         'best': headline.strongest(here, headline.main_target(here)),
         'warnings': verdicts.warnings(cells, groups[0] + groups[1]),
         'cell_count': len(rows), 'duration': _duration(sum(cell['duration_s'] for cell in cells)),
