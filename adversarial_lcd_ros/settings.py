@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Settings on the command line and in YAML files, made from config.py.
+Settings on the command line and in YAML files, made from adversarial_lcd_ros.config.
 
 One file serves nodes and commands: what ``config/params.yaml`` gives a node as parameters, the
 commands read as settings (``--config``). The command line wins over the file, the file over the
