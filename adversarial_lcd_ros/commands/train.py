@@ -55,12 +55,8 @@ def add(commands: Commands) -> None:
 
 def _train(options: Namespace) -> None:
     from adversarial_lcd_ros.sequences.part import SequencePart
-    from adversarial_lcd_ros.training.run import (
-        TRAINING_LABELS,
-        TrainingPlan,
-        default_targets,
-        train,
-    )
+    from adversarial_lcd_ros.training.plan import TRAINING_LABELS, TrainingPlan, default_targets
+    from adversarial_lcd_ros.training.run import train
 
     sources = [SequencePart.parse(text) for text in options.sequences]
     builder = config_from_options(options, BuilderConfig)
