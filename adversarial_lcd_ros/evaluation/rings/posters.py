@@ -42,7 +42,8 @@ from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import builder_for
 from adversarial_lcd_ros.registry import NONE, TARGETS
-from adversarial_lcd_ros.vision.builder import GraphBuilder, in_variant
+from adversarial_lcd_ros.vision.assembly import in_variant
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 Row = dict[str, Any]
 Checks = tuple[tuple[str, LcdConfig], ...]
