@@ -27,6 +27,7 @@ from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.judgement import Judgement, judge_evidence, judge_poses
+from adversarial_lcd_ros.poses.trajectory import nearest_in_time
 from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
@@ -208,7 +209,10 @@ def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],
         None has.
 
     """
-    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
+    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
+    row = nearest_in_time(trajectory.stamp_ns, stamps)
+    tolerance_ns = round(config.pose_tolerance_s * 1e9)
+    located: NDArray[np.bool_] = np.abs(trajectory.stamp_ns[row] - stamps) <= tolerance_ns
     if not located.any():
         raise EvaluationError(
             f'none of {len(stamps)} frames has a ground truth pose within '
@@ -252,19 +256,6 @@ def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
         raise EvaluationError(f'frame {at} is not later than the one before it: frames to label '
                               'must ascend in time')
     return stamps
-
-
-def _nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
-                  tolerance_s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
-    if not len(known_ns):
-        raise EvaluationError('the ground truth holds no pose: expected at least one')
-    after = np.clip(np.searchsorted(known_ns, wanted_ns), 1, max(len(known_ns) - 1, 1))
-    after = np.minimum(after, len(known_ns) - 1)
-    before = np.maximum(after - 1, 0)
-    earlier = np.abs(wanted_ns - known_ns[before]) <= np.abs(known_ns[after] - wanted_ns)
-    row = np.where(earlier, before, after)
-    return row, np.abs(known_ns[row] - wanted_ns) <= round(tolerance_s * 1e9)
 
 
 def count_old_enough(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
