@@ -134,11 +134,8 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
         poster_streams,
         poster_tasks,
     )
-    from adversarial_lcd_ros.evaluation.rings.report import (
-        measured_prices,
-        run_posters,
-        write_rings,
-    )
+    from adversarial_lcd_ros.evaluation.rings.report import write_rings
+    from adversarial_lcd_ros.evaluation.rings.run import measured_prices, run_posters
 
     lcd = config_from_options(options, LcdConfig)
     labels = config_from_options(options, LabelConfig)
