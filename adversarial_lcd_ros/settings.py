@@ -224,6 +224,13 @@ def add_models_option(parser: ArgumentParser) -> None:
                         'settings of single files win over it')
 
 
+def add_config_option(parser: ArgumentParser, of: str = '') -> None:
+    """Give a parser the option ``--config``: a file of settings, all or those of some nodes."""
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help=f'settings (YAML){of and f" of {of}"}; options of the command line '
+                        'win over it')
+
+
 def chosen_settings(options: Namespace, config_class: type[Config]) -> dict[str, Any]:
     """
     Return the settings of a class that the command line or the ``--config`` file names.
