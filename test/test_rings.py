@@ -349,8 +349,10 @@ def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
             yield [{'sequence': task.sequence, 'later': task.later}]
 
     def rows_of(stream):
-        return rings_run.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
-                                  LabelConfig(), run, lambda done, total: None)
+        rows, hung = rings_run.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
+                                           LabelConfig(), run, lambda done, total: None)
+        assert hung == tasks
+        return rows
 
     first = rows_of(stream)
     assert [row['later'] for row in first] == [3, 5]

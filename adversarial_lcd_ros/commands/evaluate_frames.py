@@ -9,19 +9,21 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
-import os
 from pathlib import Path
 import sys
 import time
 from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros.commands.common import (
+    add_cache_option,
     check_counts,
+    is_quiet,
     make_console,
     print_json,
     print_lines,
     progress_bar,
     tell,
+    worker_count,
 )
 from adversarial_lcd_ros.config import (
     AttackConfig,
@@ -32,7 +34,6 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
-from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.cells import Cell
@@ -59,8 +60,7 @@ def add_options(parser: ArgumentParser) -> None:
     group.add_argument('--only', action='append', metavar='PART',
                        help='a part of the recipe, alone or with others named the same way; what '
                        'is finished is not run again (default: all)')
-    group.add_argument('--cache', type=Path, metavar='FOLDER',
-                       help='where built graphs are kept (default: in the cache of the user)')
+    add_cache_option(group)
 
 
 def refuse_options(options: Namespace) -> None:
@@ -132,7 +132,6 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
         PairTask,
         poster_config,
         poster_streams,
-        poster_tasks,
     )
     from adversarial_lcd_ros.evaluation.rings.report import write_rings
     from adversarial_lcd_ros.evaluation.rings.run import measured_prices, run_posters
@@ -143,12 +142,9 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     tasks: list[PairTask] = []
     if posters[1] is not None:
         config, checks = poster_config(posters[1], posters[0])
-        hung = poster_streams(streams)
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared = run_posters(folder, hung, config, checks, lcd, labels, workers,
-                                   progress)
-        tasks = [task for stream in hung
-                 for task in poster_tasks(stream, config, lcd, checks, labels)]
+            declared, tasks = run_posters(folder, poster_streams(streams), config, checks, lcd,
+                                          labels, workers, progress)
     write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
 
@@ -242,17 +238,11 @@ def _announce(options: Namespace, streams: list[Stream], experiment: Experiment,
         tell('cells finished earlier that are of other settings, graphs, models or code: '
              f'{others}; kept, but not in the report')
     left = len(experiment.keys) - experiment.finished
-    minutes = experiment.cost_s / 60
+    minutes, jobs = experiment.cost_s / 60, worker_count(options.jobs)
     where = (f'the workers of {options.scheduler}: {minutes:.0f} min of one core'
-             if options.scheduler else
-             f'{_jobs(options)} processes: about {minutes / _jobs(options):.0f} min')
+             if options.scheduler else f'{jobs} processes: about {minutes / jobs:.0f} min')
     tell(f'{left} of {len(experiment.keys)} cells to run on {where}' if left else
          f'all {len(experiment.keys)} cells are finished')
-
-
-def _jobs(options: Namespace) -> int:
-    jobs: int | None = options.jobs
-    return jobs or os.cpu_count() or 1
 
 
 def _workers(options: Namespace) -> AbstractContextManager[Run]:
@@ -260,13 +250,13 @@ def _workers(options: Namespace) -> AbstractContextManager[Run]:
 
     if options.scheduler:
         return dask_workers(options.scheduler)
-    return local_workers(_jobs(options))
+    return local_workers(worker_count(options.jobs))
 
 
 @contextmanager
 def _bar(experiment: Experiment) -> Iterator[Callable[[float, float], None]]:
     """Show cells and time left; the time by the expected costs, the cells as they are counted."""
-    if QUIET in os.environ:
+    if is_quiet():
         yield lambda cells, share: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -292,7 +282,7 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
     for title, lines in tables:
         print_lines(title, lines)
     console.print(finding)
-    if QUIET not in os.environ:
+    if not is_quiet():
         print_lines('Processor time a frame, ms', [
             {'attack': kind, 'frames': str(frames), 'queries': f'{1e3 * queries:.1f}',
              'search': f'{1e3 * search:.1f}', 'judging': f'{1e3 * judging:.1f}'}

@@ -16,6 +16,7 @@ from adversarial_lcd_ros.errors import FileError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.rings.posters import (
     Checks,
+    PairTask,
     PosterConfig,
     poster_tasks,
     run_pair,
@@ -37,13 +38,14 @@ _CODE = ('attack', 'lcd', 'vision', 'graph', 'edge_rule', 'evaluation/rings/post
 
 def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, checks: Checks,
                 lcd: LcdConfig, labels: LabelConfig, run: Run,
-                progress: Callable[[int, int], None]) -> list[Row]:
+                progress: Callable[[int, int], None]) -> tuple[list[Row], list[PairTask]]:
     """
-    Return what was declared on each pair of places; what is in the folder is not run again.
+    Return what was declared on pairs of places, and the pairs; what is there is not run again.
 
     Parameters
     ----------
     folder : Path
+        Keeps what is declared.
     streams : sequence of Stream
     config, checks
         Of the recipe.
@@ -60,13 +62,13 @@ def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, c
     rows = [row for row in _finished(path) if row['digest'] == digests.get(row['sequence'])]
     done = {(row['sequence'], row['later']) for row in rows}
     tasks = [task for stream in streams
-             for task in poster_tasks(stream, config, lcd, checks, labels)
-             if (task.sequence, task.later) not in done]
-    for count, part in enumerate(run(run_pair, tasks), 1):
+             for task in poster_tasks(stream, config, lcd, checks, labels)]
+    left = [task for task in tasks if (task.sequence, task.later) not in done]
+    for count, part in enumerate(run(run_pair, left), 1):
         rows += [{**row, 'digest': digests[row['sequence']]} for row in part]
         write_json(path, {'rows': rows})
-        progress(count, len(tasks))
-    return sorted(rows, key=lambda row: (row['sequence'], row['later']))
+        progress(count, len(left))
+    return sorted(rows, key=lambda row: (row['sequence'], row['later'])), tasks
 
 
 def _digest(stream: Stream, *settings: object) -> str:
