@@ -221,31 +221,6 @@ def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],
                    quaternion=trajectory.quaternion[row]), located
 
 
-def relation(rows: Trajectory, image_size: tuple[int, int],
-             config: LabelConfig) -> NDArray[np.int8]:
-    """
-    Return how every two frames are related by their poses, shape (n, n), symmetric.
-
-    +1 same place: a loop. The views are near (overlap seen from both sides, distance, angle),
-    at least ``min_gap_s`` apart, and the camera looked elsewhere at some time in between.
-    -1 different places: the views share almost nothing, whichever side one looks from.
-    0 all else, also every pair less than ``min_gap_s`` apart.
-
-    Parameters
-    ----------
-    rows : Trajectory
-        One pose a frame, with the stamps of the frames, strictly ascending.
-    image_size : (int, int)
-        Width and height, pixels.
-    config : LabelConfig
-        Thresholds.
-
-    """
-    stamps = _checked_stamps(rows.stamp_ns)
-    return _relation(judge_poses(rows, image_size, config),
-                     count_old_enough(stamps, config.min_gap_s))
-
-
 def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
     stamps = np.asarray(stamp_ns, np.int64)
     if not 0 < len(stamps) <= MAX_FRAMES:
@@ -272,8 +247,12 @@ def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelCon
 
     Parameters
     ----------
-    rows, image_size, config
-        See ``relation``.
+    rows : Trajectory
+        One pose a frame, with the stamps of the frames.
+    image_size : (int, int)
+        Width and height, pixels.
+    config : LabelConfig
+        Thresholds.
 
     """
     judgement = judge_poses(rows, image_size, replace(config, rule='overlap'))
@@ -281,6 +260,13 @@ def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelCon
 
 
 def _relation(judgement: Judgement, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
+    """
+    Return how every two frames are related, shape (n, n), symmetric.
+
+    +1 same place: a loop. The views are near, at least ``min_gap_s`` apart, and the camera looked
+    elsewhere at some time in between. -1 different places: the views share almost nothing,
+    whichever side one looks from. 0 all else, also every pair less than ``min_gap_s`` apart.
+    """
     count = len(candidates)
     index = np.arange(count)
     # The newest earlier frame that looked elsewhere: a loop partner must be older than that.
