@@ -6,7 +6,7 @@ Attacks on single frames of a stream: the protocol of the paper's experiments.
 
 The stream is walked in order. The detector remembers every clean graph and the attacker sees
 each go by, but only a sample of the frames is attacked and judged, each against the map of clean
-graphs before it. In a live run (``live``, ``offline``) every frame is attacked and the map
+graphs before it. In a replay (``evaluation.replay``) every frame is attacked and the map
 consists of attacked graphs; here frames do not hang on each other, and attacks with a thousand
 queries a frame can be compared over many seeds. By pairs a sampled frame is judged against one
 given reference and its window instead (``pairs``); all else is the same.

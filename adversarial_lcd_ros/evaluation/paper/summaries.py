@@ -6,9 +6,9 @@ Cells of the paper's experiments, summarised: repeats averaged, the sequence as 
 
 A cell is one attack on one sequence with one seed. Seeds are repeats of a measurement, not
 further evidence: they are averaged within the sequence. The interval of a sequence is the block
-bootstrap over its frames (see ``statistics``): whole frames with all their repeats are drawn, in
+bootstrap over its frames (``intervals``): whole frames with all their repeats are drawn, in
 blocks of neighbours in time. It covers the choice of frames; what other places would give is
-only seen by comparing sequences (``summarise_methods``, ``paper_ranks``).
+only seen by comparing sequences (``summarise_methods``, ``ranks``).
 
 A sequence whose graphs allow no edit is in no mean, and listed: a decline of 0 there says nothing
 of an attack. Over sequences the interval is Student's t: a bootstrap of four values is too narrow.
