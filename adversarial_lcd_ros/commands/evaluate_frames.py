@@ -199,14 +199,14 @@ def _open(options: Namespace, cells: list[Cell]) -> list[Stream]:
 
     builder = config_from_options(options, BuilderConfig)
     labels = config_from_options(options, LabelConfig)
+    own_labels = load_labels(options.recipe, chosen_settings(options, LabelConfig))
     streams: list[Stream] = []
     with progress_bar('graphs') as progress:
         for variant in dict.fromkeys(cell.variant_needed for cell in cells):
             nodes = sorted({cell.nodes for cell in cells if cell.variant_needed == variant})
             streams += open_streams(
-                options.sources, nodes, builder, labels, options.cache,
-                lambda source, done, total: progress(done, total),
-                load_labels(options.recipe, chosen_settings(options, LabelConfig)), variant)
+                options.sources, nodes, builder, labels, options.cache, progress, own_labels,
+                variant)
     return streams
 
 

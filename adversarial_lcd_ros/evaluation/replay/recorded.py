@@ -21,6 +21,7 @@ from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figure
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.report import write_results
+from adversarial_lcd_ros.evaluation.replay.supervision import Tell
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -147,7 +148,7 @@ def _report(clean: MultiTierGraph, forwarded: MultiTierGraph) -> AttackReport:
 def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelConfig, *,
                        source: Mapping[str, Any] | None = None, seed: int = 42,
                        command_line: Sequence[str] = (),
-                       tell: Callable[[str], None] = lambda text: None,
+                       tell: Tell = lambda text: None,
                        ) -> tuple[Path, dict[str, Any]]:
     """
     Report on a recorded attack; return the results folder and the summary.
@@ -203,7 +204,7 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
 
 
 def _sequence(bag: Path, run: Recording, source: dict[str, Any],
-              tell: Callable[[str], None]) -> CameraSequence | GraphSequence:
+              tell: Tell) -> CameraSequence | GraphSequence:
     """Return the images of the recording, for pictures, or else its graphs alone."""
     with BagFile(bag) as opened:
         has_images = bool(opened.of_type(IMAGE, COMPRESSED_IMAGE))

@@ -14,7 +14,7 @@ nothing is lost. A run with a poster of its own always starts from the images.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -35,6 +35,7 @@ from adversarial_lcd_ros.evaluation.replay.recipe import POSTERS
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.report import write_results
+from adversarial_lcd_ros.evaluation.replay.supervision import Tell
 from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
@@ -58,7 +59,7 @@ from adversarial_lcd_ros.sequences import open_sequence
 
 
 def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence[str] = (),
-                  tell: Callable[[str], None] = lambda text: None,
+                  tell: Tell = lambda text: None,
                   keep_recordings: bool = False) -> tuple[Path, dict[str, Any]]:
     """
     Replay a bag without and with every attack; return the results folder and the summary.
@@ -113,8 +114,7 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         return folder.finish(), summary
 
 
-def _open(bag: Path, plan: Plan,
-          tell: Callable[[str], None]) -> CameraSequence | GraphSequence:
+def _open(bag: Path, plan: Plan, tell: Tell) -> CameraSequence | GraphSequence:
     """Return what is in the bag; refuse what would fail after the first minutes of a replay."""
     sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
     if sequence.trajectory is None:
@@ -149,7 +149,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
 
 
 @contextmanager
-def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
+def _kept(folder: Path, tell: Tell) -> Iterator[None]:
     """Say what is kept of an evaluation that ends early."""
     try:
         yield
@@ -161,7 +161,7 @@ def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
         raise
 
 
-def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
+def _without_builder(bag: Path, plan: Plan, tell: Tell) -> Plan:
     if plan.rebuild:
         raise EvaluationError(f'{bag} has graphs and no images: nothing can be rebuilt')
     if plan.posters:

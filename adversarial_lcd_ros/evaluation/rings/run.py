@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 import json
 from pathlib import Path
@@ -30,6 +30,7 @@ from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.files.reading import read_json
 from adversarial_lcd_ros.files.writing import write_json
 from adversarial_lcd_ros.graph import MultiTierGraph
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 POSTERS = 'posters.json'
 _CODE = ('attack', 'lcd', 'vision', 'graph', 'edge_rule', 'evaluation/rings/posters',
@@ -38,7 +39,7 @@ _CODE = ('attack', 'lcd', 'vision', 'graph', 'edge_rule', 'evaluation/rings/post
 
 def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, checks: Checks,
                 lcd: LcdConfig, labels: LabelConfig, run: Run,
-                progress: Callable[[int, int], None]) -> tuple[list[Row], list[PairTask]]:
+                progress: Progress) -> tuple[list[Row], list[PairTask]]:
     """
     Return what was declared on pairs of places, and the pairs; what is there is not run again.
 
