@@ -21,6 +21,7 @@ from adversarial_lcd_ros.commands.common import (
     make_console,
     print_json,
     print_lines,
+    print_rows,
     source_options,
     tell,
 )
@@ -187,7 +188,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     """Print the tables and the main finding of an evaluation."""
     from adversarial_lcd_ros.evaluation.replay.findings import headline, is_labelled
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
-    from adversarial_lcd_ros.evaluation.replay.tables import sweep_table
+    from adversarial_lcd_ros.evaluation.replay.tables import sweep_rows
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
 
     made = maps.make([folder], options) if options.map else None
@@ -198,7 +199,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     console = make_console()
     print_lines(*replay_lines(summary))
     if 'label_sweep' in summary:
-        console.print(sweep_table(summary))
+        print_rows('The same decisions by other labels', sweep_rows(summary))
     if made is not None:
         maps.show_runs(made)
     console.print(headline(summary))
