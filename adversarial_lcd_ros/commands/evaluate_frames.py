@@ -38,6 +38,7 @@ from adversarial_lcd_ros.settings import chosen_settings, config_from_options
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.cells import Cell
     from adversarial_lcd_ros.evaluation.frames.run import Experiment
+    from adversarial_lcd_ros.evaluation.rings.posters import Checks, PosterConfig
     from adversarial_lcd_ros.evaluation.store import Row
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
@@ -75,9 +76,9 @@ def run(options: Namespace) -> None:
     """Run the recipe, or what is left of it, and write the report."""
     from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
     from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
-    from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.recipes import RINGS, read_recipe
     from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
+    from adversarial_lcd_ros.evaluation.rings.posters import poster_config
     from adversarial_lcd_ros.evaluation.store import open_store
 
     started = time.monotonic()
@@ -86,6 +87,10 @@ def run(options: Namespace) -> None:
     conditions = _conditions(options, lcd)
     cells = [replace(cell, conditions=conditions)
              for cell in load_cells(options.recipe, _overrides(options), options.only or ())]
+    path, recipe = read_recipe(options.recipe)
+    # Wrong ones are told before the hours that cells may take.
+    posters = (None if recipe.get('posters') is None else
+               poster_config(recipe['posters'], path))
     folder = _folder(options)
     with open_store(folder) as store:
         streams = _open(options, cells)
@@ -99,40 +104,35 @@ def run(options: Namespace) -> None:
             tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
                  'there')
             raise
-        path, recipe = read_recipe(options.recipe)
-        if recipe['protocol'] == RINGS:
-            report = _rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
-        else:
-            _draw(folder, streams, cells, rows, lcd)
-            report = write_paper_report(folder, rows)
+        report = (_report_rings(options, folder, streams, cells, rows, posters)
+                  if recipe['protocol'] == RINGS else
+                  _report_frames(folder, streams, cells, rows, lcd))
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
         return
     _conclude(rows, time.monotonic() - started, report)
 
 
-def _draw(folder: Path, streams: list[Stream], cells: list[Cell], rows: list[Row],
-          lcd: LcdConfig) -> None:
-    """Leave pictures of attacked frames in the folder, and of why attacks work where they do."""
+def _report_frames(folder: Path, streams: list[Stream], cells: list[Cell], rows: list[Row],
+                   lcd: LcdConfig) -> Path:
+    """Draw attacked frames, and why attacks work where they do; write the report."""
     from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
     from adversarial_lcd_ros.evaluation.frames.why import explain
     from adversarial_lcd_ros.evaluation.frames.why_picture import write_why
+    from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
 
     write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
     write_why(folder, explain(streams, cells, rows, lcd))
+    return write_paper_report(folder, rows)
 
 
-def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
-           rows: list[Row], posters: tuple[Path, Any]) -> Path:
+def _report_rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
+                  rows: list[Row], posters: tuple[PosterConfig, Checks] | None) -> Path:
     """Hang the posters of a recipe, measure what defences cost, write the page."""
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.rings.pictures import ring_pictures
-    from adversarial_lcd_ros.evaluation.rings.posters import (
-        PairTask,
-        poster_config,
-        poster_streams,
-    )
+    from adversarial_lcd_ros.evaluation.rings.posters import PairTask, poster_streams
     from adversarial_lcd_ros.evaluation.rings.report import write_rings
     from adversarial_lcd_ros.evaluation.rings.run import measured_prices, run_posters
 
@@ -140,11 +140,10 @@ def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[
     labels = config_from_options(options, LabelConfig)
     declared: list[Row] = []
     tasks: list[PairTask] = []
-    if posters[1] is not None:
-        config, checks = poster_config(posters[1], posters[0])
+    if posters is not None:
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared, tasks = run_posters(folder, poster_streams(streams), config, checks, lcd,
-                                          labels, workers, progress)
+            declared, tasks = run_posters(folder, poster_streams(streams), *posters, lcd, labels,
+                                          workers, progress)
     write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
 
