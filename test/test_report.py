@@ -3,11 +3,11 @@
 
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from html.parser import HTMLParser
 import json
 
 from graph_factory import make_graph
 import numpy as np
+from page_links import Links
 import pytest
 
 from adversarial_lcd_ros.commands.common import print_lines
@@ -199,22 +199,6 @@ def test_pictures_are_of_the_telling_frames(records):
     assert title.startswith(f'Frame {chosen[0].frame}: ')
     assert 'allowed' in caption
     assert choose_records([], 6) == []
-
-
-class Links(HTMLParser):
-    """Collects whatever a page would load, and its text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.sources, self.text = [], ''
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.sources += [value for name, value in attributes
-                         if name in ('src', 'srcset', 'href', 'action', 'data')]
-
-    def handle_data(self, data):
-        self.text += data
 
 
 @pytest.fixture
