@@ -25,7 +25,6 @@ from typing import Any
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
-from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figures
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
@@ -105,10 +104,11 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         if plan.sweep_labels:
             write_sweep(folder.path / SWEEP, summary['label_sweep'])
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
-        _write(folder, plan, summary, records, command_line,
-               {'ros_domain_id': domain, 'source': str(bag.resolve())},
-               telling_pictures(sequence, clean, runs, records, summary, {
-                   name: plan.replay_of(name) for name in plan.posters}))
+        _write_setup(folder, plan, command_line,
+                     {'ros_domain_id': domain, 'source': str(bag.resolve())})
+        write_results(folder, summary, records, telling_pictures(
+            sequence, clean, runs, records, summary,
+            {name: plan.replay_of(name) for name in plan.posters}))
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
         return folder.finish(), summary
@@ -176,10 +176,8 @@ def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]
     return sum(a != b for a, b in zip(first, second, strict=True))
 
 
-def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
-           records: Sequence[QueryRecord], command_line: Sequence[str],
-           extra: Mapping[str, Any], pictures: Sequence[Picture]) -> None:
+def _write_setup(folder: ResultsFolder, plan: Plan, command_line: Sequence[str],
+                 extra: Mapping[str, Any]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed,
                        {**extra, **({POSTERS: dict(plan.posters)} if plan.posters else {})})
-    write_results(folder, summary, records, pictures)
