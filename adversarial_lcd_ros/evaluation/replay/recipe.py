@@ -67,7 +67,7 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> ReplayRecipe:
     attacks: dict[str, AttackConfig] = {}
     posters: dict[str, dict[str, Any]] = {}
     for entry in content['attacks']:
-        title = _title(path, entry)
+        title = _run_name(path, entry)
         if title in attacks or title == 'clean':
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
         settings = {name: value for name, value in entry.items() if name not in ('name', REPLAY)}
@@ -80,7 +80,7 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> ReplayRecipe:
     return ReplayRecipe(attacks, posters)
 
 
-def _title(path: Path, entry: Any) -> str:
+def _run_name(path: Path, entry: Any) -> str:
     """Return the name of an attack, which is also that of its run and row."""
     if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
         raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
