@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template
+from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template, svg
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.writing import write_bytes, write_text
@@ -87,9 +87,7 @@ def draw_path(labels: FrameLabels, trajectory: Trajectory) -> bytes:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 5.0), layout='constrained')
         _plot_path(figure.subplots(), labels, trajectory)
-        stream = io.BytesIO()
-        figure.savefig(stream, format='svg', metadata={'Date': None})
-    return stream.getvalue()
+        return svg(figure)
 
 
 def _plot_path(axes: Axes, labels: FrameLabels, trajectory: Trajectory) -> None:
