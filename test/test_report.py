@@ -20,7 +20,6 @@ from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay import findings, report, tables
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
-from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     make_records,
@@ -29,6 +28,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.replay.telling import choose_records, describe
 from adversarial_lcd_ros.evaluation.terminal import replay_lines
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
 from adversarial_lcd_ros.lcd.geometry import find_inliers
