@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from results_factory import ring_row
 
-from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.attack.searches import make_search
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
@@ -41,9 +42,11 @@ from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME, Condit
 from adversarial_lcd_ros.evaluation.rings.summaries import (
     ANY,
     FLIPS,
+    NODES,
     WITHIN_NODES,
     WITHIN_R,
     defence_title,
+    ring_of,
     summarise,
     worst_cases,
 )
@@ -53,6 +56,7 @@ from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.paths import share_path
+from adversarial_lcd_ros.registry import SEARCHES
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 CAMERA = Camera(np.eye(3), np.zeros(3), 0.785, 640, 480)
@@ -335,6 +339,14 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
     assert dict(checks)['check and hull'] == LcdConfig(defences='geometric_check',
                                                        geometric_hull=0.1)
     assert {condition.count for condition in conditions_of(config)} == {0, 1, 2}
+
+
+@pytest.mark.parametrize('name', list(SEARCHES))
+def test_an_attack_counts_by_what_its_search_changes(name):
+    search = make_search(AttackConfig(search=name))
+    graph = make_graph(60, [(0, 1)])
+    search.observe(graph)
+    assert (search.budget(graph).nodes > 0) == (ring_of({'search': name}) == NODES)
 
 
 def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):

@@ -18,9 +18,8 @@ from adversarial_lcd_ros.evaluation.frames.cells import SEALED
 from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE
+from adversarial_lcd_ros.registry import SEARCHES
 
-# What an attacker changes, by his search; all else flips edges.
-NODE_SEARCHES = ('move_nodes', 'replay')
 FLIPS, NODES = 'flips', 'nodes'
 # Worst cases: flips within the usual r, those or as many nodes as usual, and all that is there.
 LEVELS = WITHIN_R, WITHIN_NODES, ANY = (
@@ -34,7 +33,8 @@ _SINCE = {'sealed': False, 'moved': ''}
 
 def ring_of(row: Mapping[str, Any]) -> str:
     """Return what an attack changes: FLIPS or NODES."""
-    return NODES if row['search'] in NODE_SEARCHES else FLIPS
+    search = SEARCHES.look_up(row['search'])
+    return NODES if search is not None and search.changes_nodes else FLIPS
 
 
 def defence_title(row: Mapping[str, Any]) -> str:
