@@ -17,7 +17,7 @@ from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.labels.check import check_labels
 from adversarial_lcd_ros.evaluation.labels.page import PicturePair, write_page
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS
 from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import Labelled, Views, label_views

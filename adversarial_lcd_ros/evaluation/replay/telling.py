@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from adversarial_lcd_ros.evaluation.metrics import UNTOLD_MATCH
+from adversarial_lcd_ros.evaluation.outcomes import UNTOLD_MATCH
 from adversarial_lcd_ros.evaluation.replay.records import NO_TRUTH, QueryRecord
 
 _EFFECTS = {
