@@ -29,7 +29,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SUPERVISOR = 'ADVERSARIAL_LCD_SUPERVISOR'
 # Set where nothing but results, warnings and errors is to be said.
 QUIET = 'ADVERSARIAL_LCD_QUIET'
-_GRACE_S = 1.5
+_GRACE_S = 3.0
 _PR_SET_PDEATHSIG = 1
 _PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x',
                              '…': '~'}
@@ -41,7 +41,7 @@ def interruptible(exit_code: int) -> None:
     """
     Let the first SIGINT or SIGTERM raise KeyboardInterrupt, and ignore the others.
 
-    Some code swallows exceptions, and some clean-ups take long: what has not ended 1.5 s after
+    Some code swallows exceptions, and some clean-ups take long: what has not ended 3 s after
     the signal is cut off.
 
     Parameters

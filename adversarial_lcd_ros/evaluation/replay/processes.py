@@ -132,7 +132,9 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     if setup.builder:
         sections['graph_builder'] = {**asdict(setup.builder), **key}
     if setup.attack:
-        sections['attacker'] = asdict(setup.attack)
+        # On a busy machine an answer may be slow; an attack that ends for it is another attack.
+        sections['attacker'] = {**asdict(setup.attack),
+                                'query_timeout_s': setup.replay.timeout_s / 2}
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
