@@ -82,13 +82,30 @@ def ignore_signals() -> None:
 
 
 def write_plainly() -> None:
-    """Let stdout and stderr replace what their encoding lacks: a terminal need not be UTF-8."""
+    """
+    Let stdout and stderr replace what their encoding lacks: a terminal need not be UTF-8.
+
+    Where one was closed, what is written to it goes nowhere; its number would else be that of the
+    next file that is opened.
+    """
+    _open_closed()
     codecs.register_error(_ERRORS, _replace)
     for stream in (sys.stdout, sys.stderr):
         # Some programs put streams of their own there, or none.
         reconfigure = getattr(stream, 'reconfigure', None)
         if reconfigure is not None:
             reconfigure(errors=_ERRORS)
+
+
+def _open_closed() -> None:
+    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, 'r' if number == 0 else 'w', encoding='utf-8',
+                                    closefd=False))
 
 
 def _replace(error: UnicodeError) -> tuple[str, int]:

@@ -119,10 +119,13 @@ def test_a_pipeline_of_processes_loses_nothing_and_ends_with_exit_code_0(
         processes, tmp_path, vocabulary, lcd_model):
     if not TOUR.is_dir():
         pytest.skip(f'{TOUR} is not in this checkout')
+    # The others may take minutes to import where the machine is busy.
     processes.start('bag_replay', bag=TOUR, lockstep='true', record=tmp_path / 'record',
-                    duration_s=FRAMES * FRAME_S - FRAME_S / 2)
+                    duration_s=FRAMES * FRAME_S - FRAME_S / 2, start_timeout_s='0.0',
+                    timeout_s=120.0)
     processes.start('lcd', model=lcd_model, min_gap_s=1.0)
-    processes.start('attacker', ratio=0.0003, queries_per_edit=1, max_queries=5)
+    processes.start('attacker', ratio=0.0003, queries_per_edit=1, max_queries=5,
+                    query_timeout_s=60.0)
     processes.start('graph_builder', 'graph:=graph_clean', detector='none',
                     vocabulary=vocabulary)
     assert processes.wait('bag_replay') == 0, processes.log('bag_replay')
