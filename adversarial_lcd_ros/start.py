@@ -58,6 +58,10 @@ def interruptible(exit_code: int) -> None:
         raise KeyboardInterrupt
     for number in SIGNALS:
         signal.signal(number, interrupt)
+    # What calls back from C, as compiling does, swallows it too, and would print a traceback.
+    told = sys.unraisablehook
+    sys.unraisablehook = lambda found: (
+        None if issubclass(found.exc_type, KeyboardInterrupt) else told(found))
 
 
 def _leave() -> None:

@@ -475,3 +475,13 @@ def test_any_callable_may_answer(said, is_loop, is_soft):
 def test_what_is_no_answer_is_an_error(said):
     with pytest.raises(AdversarialLcdError, match='expected a probability'):
         as_answer(said)
+
+
+@pytest.mark.filterwarnings('error')
+def test_features_of_any_scores_are_numbers():
+    """The schema bounds scores of features from below alone."""
+    score = np.linspace(0, 3e38, GRAPH.node_count).astype(np.float32)
+    score[:GRAPH.object_count] = 0.5
+    x = node_features(replace(GRAPH, score=score))
+    assert np.isfinite(x).all()
+    assert np.ptp(x[GRAPH.object_count:, 4]) > 1

@@ -179,6 +179,18 @@ def test_code_that_swallows_the_interrupt_is_cut_off():
     process.stdout.close()
 
 
+def test_an_interrupt_in_a_callback_from_c_prints_no_traceback():
+    """It is lost there, as while compiling: what was interrupted so is cut off."""
+    process = subprocess.Popen(
+        [sys.executable, '-c', 'from adversarial_lcd_ros.start import interruptible\n'
+         'import ctypes, os, signal, time\ninterruptible(130)\n'
+         '@ctypes.CFUNCTYPE(None)\ndef callback():\n'
+         '    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(0.01)\n'
+         'callback()\ntime.sleep(600)'], env=environment(), stderr=subprocess.PIPE, text=True)
+    assert process.communicate(timeout=DEADLINE_S)[1] == ''
+    assert process.returncode == 130
+
+
 class Peer:
     """A node as ``await_end`` sees it: states, then an exit code."""
 
