@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     ----------
     argv : sequence of str, optional
         Command line without the program. That of the process if not given: then the process is
-        taken to be this command's own, and ends within two seconds of a signal.
+        taken to be this command's own, and ends within three seconds of a signal.
 
     """
     before = signal.getsignal(signal.SIGTERM)
