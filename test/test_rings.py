@@ -20,7 +20,8 @@ from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
-from adversarial_lcd_ros.evaluation.rings import plots, report
+from adversarial_lcd_ros.evaluation.rings import plots
+from adversarial_lcd_ros.evaluation.rings import run as rings_run
 from adversarial_lcd_ros.evaluation.rings.html import headline, rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
@@ -339,7 +340,7 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
 def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
     stream = SimpleNamespace(name='tour', digest='a')
     tasks = [SimpleNamespace(sequence='tour', later=later) for later in (5, 3)]
-    monkeypatch.setattr(report, 'poster_tasks', lambda *_: tasks)
+    monkeypatch.setattr(rings_run, 'poster_tasks', lambda *_: tasks)
     asked = []
 
     def run(function, some):
@@ -348,14 +349,16 @@ def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
             yield [{'sequence': task.sequence, 'later': task.later}]
 
     def rows_of(stream):
-        return report.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
-                                  LabelConfig(), run, lambda done, total: None)
+        rows, hung = rings_run.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
+                                           LabelConfig(), run, lambda done, total: None)
+        assert hung == tasks
+        return rows
 
     first = rows_of(stream)
     assert [row['later'] for row in first] == [3, 5]
     assert rows_of(stream) == first
     assert asked == [5, 3]
-    (tmp_path / report.POSTERS).write_text('{"rows": 7}')
+    (tmp_path / rings_run.POSTERS).write_text('{"rows": 7}')
     rows_of(stream)
     rows_of(SimpleNamespace(name='tour', digest='b'))
     assert asked == [5, 3] * 3

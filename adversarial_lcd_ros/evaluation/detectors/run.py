@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.digests import file_digest
+from adversarial_lcd_ros.evaluation.digests import model_digests
 from adversarial_lcd_ros.evaluation.metrics import (
     Metrics,
     first_closure_latency_s,
@@ -108,9 +108,7 @@ class TargetTask:
         values = {'schema': SCHEMA, 'code': code_digest(*_CODE),
                   'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
-                  'models': [file_digest(path) for path in
-                             (self.model, self.model.with_suffix('.onnx')) if path.exists()],
-                  'seeds': self.seeds,
+                  'models': model_digests(self.model), 'seeds': self.seeds,
                   'scored': self.scored, 'labels': asdict(self.label_config)}
         if self.protocol == 'pairs':
             # The stream's digest is of what a replay needs, and knows nothing of pairs.

@@ -27,7 +27,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
-from adversarial_lcd_ros.vision.draw import draw_attack
+from adversarial_lcd_ros.vision.panels import draw_attack
 
 PICTURES = 6
 _BLANK_GREY = 235

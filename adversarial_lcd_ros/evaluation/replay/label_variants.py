@@ -35,7 +35,6 @@ _GRID: Mapping[str, tuple[float, ...]] = {
     'positive_angle_deg': (15.0, 40.0)}
 
 
-
 def label_variants(base: LabelConfig) -> Iterator[tuple[str, LabelConfig]]:
     """Yield settings by what differs from the base, the base first; impossible ones left out."""
     yield 'as set', base

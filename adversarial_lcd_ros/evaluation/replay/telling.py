@@ -20,7 +20,7 @@ from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, runs_of
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
-from adversarial_lcd_ros.vision.draw import draw_attack
+from adversarial_lcd_ros.vision.panels import draw_attack
 
 PICTURES = 6
 BLANK_GREY = 64
