@@ -131,3 +131,11 @@ def test_a_decision_shows_the_match_beside_and_the_verdict_below(is_loop):
     assert red.any()
     coloured = np.ptp(shown[390:420].astype(int), axis=2).max()
     assert (coloured > 100) == is_loop
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('size', [1e30, 3e38, 1e-45])
+def test_boxes_of_any_size_are_drawn(size):
+    graph = scene()
+    drawn = draw_graph(FRAME, replace(graph, size=np.full_like(graph.size, size)))
+    assert drawn.shape == FRAME.shape

@@ -69,7 +69,7 @@ def refuse_options(options: Namespace) -> None:
     given = [f'--{name}' for name in _OPTIONS if getattr(options, name) is not None]
     if given:
         raise ConfigError(f'{", ".join(given)} belong to recipes of the protocol "frames"; '
-                          f'{options.recipe} replays a bag through the nodes')
+                          f'{options.recipe or "this"} replays a bag through the nodes')
 
 
 def run(options: Namespace) -> None:

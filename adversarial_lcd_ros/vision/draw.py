@@ -32,6 +32,8 @@ _LEGEND_STRENGTH = 0.72
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 # Coordinates of lines are handed over in 1/16 pixel.
 _SHIFT = 4
+# No box, however large, reaches further, pixels; OpenCV takes no number of any size.
+_FAR = 1 << 15
 _DASH, _GAP = 7.0, 5.0
 _TAG_HEIGHT = 16
 
@@ -133,8 +135,9 @@ def _draw_objects(canvas: NDArray[np.uint8], graph: MultiTierGraph, classes: Seq
     """Draw boxes and, over them, the class names, none on another; the scene without a box."""
     count = graph.found_objects
     half = graph.size[:count] / 2
-    corners = np.rint(scale * np.hstack([graph.position[:count] - half,
-                                         graph.position[:count] + half])).astype(int).tolist()
+    corners = np.clip(np.rint(scale * np.hstack([
+        graph.position[:count] - half, graph.position[:count] + half])), -_FAR, _FAR
+        ).astype(int).tolist()
     for left, top, right, bottom in corners:
         cv2.rectangle(canvas, (left, top), (right, bottom), OBJECT, 1, cv2.LINE_AA)
     names = [classes[label] if label < len(classes) else f'class {label}'

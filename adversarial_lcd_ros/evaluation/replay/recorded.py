@@ -41,7 +41,7 @@ from adversarial_lcd_ros.sequences.bagfile import (
     BagFile,
     is_bag,
 )
-from adversarial_lcd_ros.sequences.replay import read_payloads
+from adversarial_lcd_ros.sequences.replay import read_messages
 
 # The run of the attacker that was recorded, whose settings nobody recorded.
 RECORDED = 'recorded'
@@ -129,7 +129,7 @@ def read_recording(path: Path) -> Heard:
 
 
 def _by_stamp(path: Path, topic: str, decode: Callable[[bytes], MessageT]) -> dict[int, MessageT]:
-    messages = [decode(payload) for _, payload in read_payloads(path, topic)]
+    messages = read_messages(path, topic, decode)
     stamps = [message.stamp_ns for message in messages]
     if len(set(stamps)) < len(stamps):
         twice = next(stamp for at, stamp in enumerate(stamps) if stamp in stamps[:at])
