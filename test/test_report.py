@@ -268,7 +268,8 @@ def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
     assert "The attack eigen, the paper's, took" in findings.headline(summary)
     unsure = {**ours, 'decline_ci95': (0.0, 30.0)}
     text = findings.headline({**summary, 'attacks': [eigen, unsure]})
-    assert "The strongest, recall, this project's own, changed it" in text
+    assert "recall, this project's own, took 20.0 points" in text
+    assert 'whether that is chance: 95\u202f% interval 0.0 to 30.0' in text
     assert "The paper's own (eigen) took" in text
 
 

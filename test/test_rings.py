@@ -250,7 +250,10 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     assert ', or refused 100 %' in report
     assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [
         'sealed graphs', 'rederive', 'none']
-    assert '100.0 % are left, refusals, with an alarm each, counted as attacks that' in report
+    assert 'Sealed graphs refuse what was changed, with an alarm each: counting that as ' in report
+    assert 'failed attack, 100.0 % are left.' in report
+    assert '<small>100.0 % or refused</small>' in report
+    assert 'tour, wl: 3 frames with a loop, 3 at a new place' in report
     assert 'Sealed graphs: builder and detector share a key.' in report
     # A folder from before there were seals and counts.
     old = tmp_path / 'old'
@@ -284,8 +287,24 @@ def test_the_same_nodes_close_and_far_apart_are_two_curves():
     for row, budget in zip(rows, (40, 80, 40, 80), strict=True):
         row['node_budget_mean'] = budget
     lines = plots._over(rows, 'nodes', 'move_nodes')
-    assert lines == {('tour', 'close: none'): {40: 50.0, 80: 50.0},
-                     ('tour', 'spread: none'): {40: 50.0, 80: 50.0}}
+    assert {title: {at: point.value for at, point in line.items()}
+            for title, line in lines.items()} == {
+        ('tour', 'close: none'): {40: 50.0, 80: 50.0},
+        ('tour', 'spread: none'): {40: 50.0, 80: 50.0}}
+
+
+def test_points_of_curves_have_intervals():
+    row = summarise([ring_row('', 'recall', 'recall', [LOST, LEFT])], 1)[0]
+    line, = plots._over([{**row, 'ci95': [20.0, 70.0]}, {**row, 'ratio': 9.0, 'ci95': None}],
+                        'ratio', plots.FLIPS).values()
+    assert line == {row['ratio']: (50.0, 20.0, 70.0), 9.0: (50.0, 50.0, 50.0)}
+    posters = [{'sequence': 'tour', 'control': plots.SAME, 'count': 1, 'kind': 'cells',
+                'target': 'wl', 'check': 'none', 'share': share, 'to_poster': fooled, 'pairs': 12}
+               for share, fooled in ((.1, 0), (.2, 12))]
+    line, = plots._posters(posters).values()
+    # Wilson's interval of 0 of 12 ends at z^2 / (n + z^2).
+    assert line[.1] == pytest.approx((0.0, 0.0, 3.8415 / 15.8415), abs=1e-4)
+    assert line[.2] == pytest.approx((1.0, 1 - 3.8415 / 15.8415, 1.0), abs=1e-4)
 
 
 def test_a_seal_has_a_price():
