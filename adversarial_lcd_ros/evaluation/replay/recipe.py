@@ -12,7 +12,9 @@ from typing import Any
 from adversarial_lcd_ros.attack.images.posting import spans_in
 from adversarial_lcd_ros.config import AttackConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.methods import attack_columns, used_settings
 from adversarial_lcd_ros.evaluation.recipes import LIVE, read_recipe
+from adversarial_lcd_ros.evaluation.wording import attack_title
 from adversarial_lcd_ros.registry import NONE
 
 MAX_ATTACKS = 1000
@@ -24,6 +26,10 @@ _MAX_NAME, _POSTER = 200, 'poster'
 def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
     """
     Return the attacks of a recipe by name, in its order.
+
+    Where overrides make another attack of one, such as another search, it is called by its
+    settings: its name in the recipe would tell of what did not run. Attacks that overrides make
+    the same run once.
 
     Parameters
     ----------
@@ -39,17 +45,33 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
 
     """
     path, entries = _entries(name)
-    attacks: dict[str, AttackConfig] = {}
+    names, attacks = {'clean'}, dict[str, AttackConfig]()
     for title, entry in entries:
-        if title in attacks or title == 'clean':
+        if title in names:
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
+        names.add(title)
         settings = {name: value for name, value in entry.items()
                     if name not in ('name', REPLAY)}
-        attacks[title] = AttackConfig.from_mapping({**settings, **overrides})
+        attack = AttackConfig.from_mapping({**settings, **overrides})
+        if REPLAY not in entry:  # what a poster does hangs on no setting of the attacker
+            if overrides and used_settings(attack) in map(used_settings, attacks.values()):
+                continue
+            title = _title(title, AttackConfig.from_mapping(settings), attack, attacks)
+        attacks[title] = attack
     if len(attacks) > MAX_ATTACKS:
         raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
                           f'expected at most {MAX_ATTACKS}')
     return attacks
+
+
+def _title(title: str, meant: AttackConfig, attack: AttackConfig,
+           taken: Mapping[str, AttackConfig]) -> str:
+    """Return what an attack is called that the recipe calls by a title and means so."""
+    runs = {'mode': attack.mode, **attack_columns(attack)}
+    if runs == {'mode': meant.mode, **attack_columns(meant)}:
+        return title
+    by_settings = attack_title(runs)
+    return f'{by_settings} (in place of {title})' if by_settings in taken else by_settings
 
 
 def load_posters(name: str) -> dict[str, dict[str, Any]]:
