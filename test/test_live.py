@@ -16,11 +16,11 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.replay import replays
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
-from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.messages.types import AttackReport
