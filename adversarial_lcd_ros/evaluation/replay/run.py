@@ -149,7 +149,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         if attack['name'] in plan.posters:
             hung = plan.replay_of(attack['name'])
             attack['poster'] = {'kind': hung.poster, 'share': hung.poster_share,
-                                'spans': hung.poster_spans}
+                                'sheets': hung.poster_sheets, 'spans': hung.poster_spans}
     summary['unexplained_edges'] = unexplained_edges(sent, plan.lcd)
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()
