@@ -101,7 +101,7 @@ def test_an_attacker_over_budget_fails_the_run():
 
 
 def test_the_recipe_that_ships_and_what_overrides_it():
-    attacks = load_recipe('quick', {'ratio': 1e-4})
+    attacks = load_recipe('quick', {'ratio': 1e-4}).attacks
     assert {attack.search for attack in attacks.values()} == {'recall', 'stepwise'}
     assert {attack.ratio for attack in attacks.values()} == {1e-4}
 

@@ -20,7 +20,7 @@ from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay import run as live
 from adversarial_lcd_ros.evaluation.replay.findings import headline, meaning
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
-from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
+from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
@@ -41,8 +41,9 @@ def test_posters_of_the_recipe_that_ships_hang_in_places_that_certainly_differ()
     bag = share_path('bags/flat_tour')
     sequence = open_sequence(bag)
     time_s = (sequence.stamps_ns - sequence.stamps_ns[0]) / 1e9
-    posters = load_posters('posters')
-    assert list(posters) == list(load_recipe('posters', {}))
+    recipe = load_recipe('posters', {})
+    posters = recipe.posters
+    assert list(posters) == list(recipe.attacks)
     spans = {text: spans_in(text) for text in (
         settings['poster_spans'] for settings in posters.values())}
     hung = [[(start <= time_s) & (time_s < stop) for start, stop in each]
@@ -70,7 +71,7 @@ def test_wrong_posters_are_refused(tmp_path, replay, said):
     path = tmp_path / 'recipe.yaml'
     path.write_text(f'attacks: [{{name: a, mode: pass, replay: {replay}}}]')
     with pytest.raises(ConfigError, match=said):
-        load_posters(str(path))
+        load_recipe(str(path), {})
 
 
 @pytest.mark.parametrize(('attacks', 'posters', 'built'), [

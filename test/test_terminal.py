@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.cli import main
-from adversarial_lcd_ros.commands.common import make_console, progress_bar
-from adversarial_lcd_ros.evaluation.replay.tables import _table
+from adversarial_lcd_ros.commands.common import print_rows, progress_bar
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
@@ -78,8 +77,8 @@ def test_a_bag_is_shown_on_any_terminal(terminal, bag, encoding, width):
 def test_tables_of_an_evaluation_are_shown_on_any_terminal(terminal, tmp_path, encoding):
     opened = terminal(encoding)
     main(['inspect', str(tmp_path / 'none')])  # what every command does with its streams
-    make_console().print(_table('The detector on [/bold]', [
-        {'run': name, 'balanced': '75.0\u202f% → 50.0\u202f%'} for name in NAMES]))
+    print_rows('The detector on [/bold]', [
+        {'run': name, 'balanced': '75.0\u202f% → 50.0\u202f%'} for name in NAMES])
     text = opened.text()
     assert 'The detector on [/bold]' in text
     assert all(f' {name} ' in text for name in NAMES)

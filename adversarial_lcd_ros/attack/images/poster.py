@@ -5,7 +5,9 @@
 A poster in the scene: the same simple, highly textured patch in two places (Ikram et al.).
 
 Two sheets hang in opposite corners of one square of half the frame: who knows that a check asks
-how much of the frame agrees makes more of it agree with no more paper. Whoever hangs it needs no access to any message. What is pasted is lit, blurred and noisy, each
+how much of the frame agrees makes more of it agree with no more paper.
+
+Whoever hangs it needs no access to any message. What is pasted is lit, blurred and noisy, each
 time otherwise, and seen in perspective; it is a stand-in for a printed sheet, and no print was
 photographed.
 """
