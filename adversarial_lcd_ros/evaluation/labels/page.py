@@ -17,11 +17,12 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template
+from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template, svg
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.writing import write_bytes, write_text
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels
+from adversarial_lcd_ros.poses.trajectory import nearest_in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,14 +90,11 @@ def draw_path(labels: FrameLabels, trajectory: Trajectory) -> bytes:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 5.0), layout='constrained')
         _plot_path(figure.subplots(), labels, trajectory)
-        stream = io.BytesIO()
-        figure.savefig(stream, format='svg', metadata={'Date': None})
-    return stream.getvalue()
+        return svg(figure)
 
 
 def _plot_path(axes: Axes, labels: FrameLabels, trajectory: Trajectory) -> None:
-    row = np.searchsorted(trajectory.stamp_ns, labels.stamp_ns)
-    place = trajectory.position[np.minimum(row, len(trajectory) - 1)]
+    place = trajectory.position[nearest_in_time(trajectory.stamp_ns, labels.stamp_ns)]
     across, up = np.sort(np.argsort(np.ptp(place, axis=0))[-2:])
     names = np.array(labels.names)
     axes.plot(place[:, across], place[:, up], color='#dddfe3', linewidth=0.8, zorder=0)
