@@ -63,6 +63,8 @@ _TRAINED: Mapping[type[Config], tuple[str, str]] = {
     AttackConfig: ('surrogate_data', SURROGATE_DATA)}
 
 _ANY_NAMESPACE = '/**/'
+# What the headings of options begin with that settings have.
+SETTINGS_OF = 'settings of '
 # Behind a class and a dot: what its options start with. No setting has this name.
 _PREFIX = '(prefix)'
 _HEADER = """\
@@ -171,7 +173,7 @@ def add_config_options(parser: ArgumentParser, config_class: type[Config],
 
     """
     parser.set_defaults(**{f'{config_class.__name__}.{_PREFIX}': prefix})
-    group = parser.add_argument_group(f'settings of {config_class.title}')
+    group = parser.add_argument_group(f'{SETTINGS_OF}{config_class.title}')
     for entry in fields(config_class):
         flag = f'--{prefix}{entry.name}'.replace('_', '-')
         shown = ', '.join(filter(None, (limits(entry), f'default: {_scalar(entry.default)}')))

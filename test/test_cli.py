@@ -4,6 +4,8 @@
 """The command: thin, errors in one line, exit codes."""
 
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,6 +16,8 @@ import pytest
 
 from adversarial_lcd_ros import __version__
 from adversarial_lcd_ros.cli import main
+from adversarial_lcd_ros.commands.examples import EXAMPLES
+from adversarial_lcd_ros.commands.parser import make_parser
 from adversarial_lcd_ros.config import AttackConfig
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
@@ -21,6 +25,11 @@ from adversarial_lcd_ros.settings import render_parameters
 
 COMMANDS = ('demo', 'import', 'evaluate', 'report', 'train', 'fetch-model', 'compile', 'clean',
             'convert', 'inspect', 'params')
+
+
+def parsers():
+    """Return the parser of every command, by name."""
+    return next(action for action in make_parser()._actions if action.choices).choices
 
 
 def wire(payload):
@@ -68,7 +77,7 @@ def test_version_and_commands(capsys):
         main(['--help'])
     out = capsys.readouterr().out
     for command in COMMANDS:
-        assert f'    {command}' in out
+        assert f'\n  {command} ' in out
 
 
 @pytest.mark.parametrize('command', COMMANDS)
@@ -78,11 +87,35 @@ def test_every_command_explains_itself(command, capsys):
     assert 'usage: adversarial-lcd' in capsys.readouterr().out
 
 
-def test_help_shows_defaults_and_ranges(capsys):
+def test_the_whole_help_shows_defaults_and_ranges(capsys):
     with pytest.raises(SystemExit, match='0'):
-        main(['demo', '--help'])
+        main(['demo', '--help-all'])
     out = ' '.join(capsys.readouterr().out.split())
     assert f'(0.0 to 1.0, default: {AttackConfig().ratio})' in out
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_help_names_settings_and_explains_none(command):
+    parser = parsers()[command]
+    text = parser.format_help()
+    assert len(text.splitlines()) < 150
+    assert all(re.search(rf'{re.escape(option)}\b', text)
+               for option in parser.option_names() if not option.startswith('--no-'))
+
+
+@pytest.mark.parametrize('command', EXAMPLES)
+def test_examples_of_the_help_are_right(command):
+    assert f'adversarial-lcd {EXAMPLES[command][0][0]}' in parsers()[command].format_help()
+    for line, _ in EXAMPLES[command]:
+        assert line.split()[0] == command
+        make_parser().parse_args(shlex.split(line.partition('>')[0]))
+
+
+def test_every_command_has_its_place_in_the_help(capsys):
+    assert set(parsers()) == {name for group in make_parser().groups.values() for name in group}
+    with pytest.raises(SystemExit, match='2'):
+        main([])
+    assert make_parser().format_help() == capsys.readouterr().err
 
 
 @pytest.mark.parametrize('arguments', [

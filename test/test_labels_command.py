@@ -67,6 +67,24 @@ def test_check_holds_a_rule_against_the_exact_shares(sequence, tmp_path, monkeyp
     assert 'right pairs elsewhere' in capsys.readouterr().out
 
 
+def test_ground_truth_can_be_named_and_what_is_missing_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('ADVERSARIAL_LCD_CACHE', str(tmp_path / 'cache'))
+    folder = tmp_path / 'pictures'
+    folder.mkdir()
+    for frame in range(24):
+        cv2.imwrite(str(folder / f'{frame}.png'), make.noise(frame % 12))
+    (tmp_path / 'poses.txt').write_text(''.join(
+        f'{100 + frame}.0 {5 * (frame % 12)} 0 0 0 0 0 1\n' for frame in range(24)))
+    line = ['labels', str(folder), '--label-rule', 'overlap', '--output', str(tmp_path / 'out')]
+    assert main(line) == 2
+    said = capsys.readouterr().err
+    assert 'no ground truth' in said
+    assert '--ground-truth' in said
+    assert main([*line, '--ground-truth', str(tmp_path / 'poses.txt')]) == 0
+    assert '12 frames with a loop and ' in capsys.readouterr().out
+    assert json.loads((tmp_path / 'out/summary.json').read_text())['rows'][0]['positive'] == 12
+
+
 def test_without_exact_shares_there_is_nothing_to_check(sequence, tmp_path, capsys):
     (sequence / 'covisibility.npz').unlink()
     assert main(['labels', str(sequence), '--check', '--label-rule', 'overlap',

@@ -16,6 +16,7 @@ from adversarial_lcd_ros.config import (
     ReplayConfig,
 )
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.evaluation.methods import used_settings
 from adversarial_lcd_ros.evaluation.replay import replays
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
@@ -104,6 +105,25 @@ def test_the_recipe_that_ships_and_what_overrides_it():
     attacks = load_recipe('quick', {'ratio': 1e-4}).attacks
     assert {attack.search for attack in attacks.values()} == {'recall', 'stepwise'}
     assert {attack.ratio for attack in attacks.values()} == {1e-4}
+
+
+@pytest.mark.parametrize(('overrides', 'names'), [
+    ({'ratio': 1e-4}, ['recall', 'recall, no queries', 'eigencentrality + SVM-RBF',
+                       'eigencentrality + SVM-RBF, no queries']),
+    # The search of the last two is not the paper's any more, and the last is the second.
+    ({'search': 'recall'}, ['recall', 'recall, no queries', 'recall, query-guided']),
+    # Recall has no perturbation.
+    ({'perturbation': 'random_walk'}, [
+        'recall', 'recall, no queries', 'random walk + SVM-RBF, query-guided',
+        'random walk + SVM-RBF, surrogate only']),
+    ({'search': 'replay', 'mode': 'query'}, [
+        'replay, query-guided', 'replay, query-guided (in place of recall, no queries)',
+        'replay, query-guided (in place of eigencentrality + SVM-RBF)']),
+])
+def test_an_attack_is_called_what_it_is(overrides, names):
+    attacks = load_recipe('quick', overrides).attacks
+    assert list(attacks) == names
+    assert len(set(map(used_settings, attacks.values()))) == len(names)
 
 
 @pytest.mark.parametrize(('text', 'said'), [

@@ -20,7 +20,6 @@ from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay import findings, report, tables
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
-from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     make_records,
@@ -29,6 +28,7 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.replay.telling import choose_records, describe
 from adversarial_lcd_ros.evaluation.terminal import replay_lines
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
 from adversarial_lcd_ros.lcd.geometry import find_inliers
@@ -268,7 +268,8 @@ def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
     assert "The attack eigen, the paper's, took" in findings.headline(summary)
     unsure = {**ours, 'decline_ci95': (0.0, 30.0)}
     text = findings.headline({**summary, 'attacks': [eigen, unsure]})
-    assert "The strongest, recall, this project's own, changed it" in text
+    assert "recall, this project's own, took 20.0 points" in text
+    assert 'whether that is chance: 95\u202f% interval 0.0 to 30.0' in text
     assert "The paper's own (eigen) took" in text
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from adversarial_lcd_ros.commands.examples import shown
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import add_config_option
 from adversarial_lcd_ros.start import QUIET
@@ -28,7 +29,8 @@ Commands: TypeAlias = '_SubParsersAction[Any]'
 def add_command(commands: Commands, name: str, help: str,
                 run: Callable[[Namespace], None]) -> ArgumentParser:
     """Add a command that calls ``run`` with its options; return its parser."""
-    parser: ArgumentParser = commands.add_parser(name, help=help, description=help)
+    parser: ArgumentParser = commands.add_parser(name, help=help, description=help,
+                                                 epilog=shown(name))
     parser.set_defaults(run=run, parser=parser)
     parser.add_argument('-q', '--quiet', action='store_true',
                         help='say nothing but results, warnings and errors')

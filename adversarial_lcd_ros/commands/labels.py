@@ -10,7 +10,13 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
+from adversarial_lcd_ros.commands.common import (
+    Commands,
+    add_command,
+    add_source_options,
+    imported_source,
+    progress_bar,
+)
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.settings import add_config_option, add_config_options, config_from_options
 
@@ -31,6 +37,7 @@ def add(commands: Commands) -> None:
                         help='hold the audit, or the rule that is chosen, against the exact '
                         'co-visibility beside the sequence')
     add_config_option(parser)
+    add_source_options(parser)
     add_config_options(parser, LabelConfig, 'label-')
 
 
@@ -38,15 +45,18 @@ def _labels(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.labels.run import write_labels
 
     config = config_from_options(options, LabelConfig)
+    source = imported_source(options.source, options)
     with progress_bar('views compared') as progress:
-        summary = write_labels(options.source, options.output, config, check=options.check,
+        summary = write_labels(source, options.output, config, check=options.check,
                                command_line=sys.argv, progress=progress)
     row = summary['rows'][0]
     _print(row)
     if options.check:
         print('held against exact co-visibility:')
         _print(row['check'])
-    print(options.output / 'report.html')
+    print(f'{row["positive"]} frames with a loop and {row["negative"]} at a new place, of '
+          f'{row["frames"]}, will be scored; look at the pairs before you believe a figure')
+    print(f'report: {options.output / "report.html"}')
 
 
 def _print(values: dict[str, Any]) -> None:

@@ -158,7 +158,8 @@ def label_sequence(sequence: GraphSequence, config: LabelConfig) -> FrameLabels:
     """
     if sequence.trajectory is None:
         raise EvaluationError(f'{sequence.name} has no ground truth: without it nobody knows '
-                              'which decisions are right')
+                              'which decisions are right; name it with --ground-truth '
+                              '("adversarial-lcd inspect" tells what there is), or import it so')
     labels = label_graphs(sequence.graphs, sequence.trajectory, sequence.source, config)
     if not labels.kind.any():
         raise EvaluationError(f'{sequence.name}: none of {len(labels.kind)} frames is a loop or '

@@ -267,7 +267,6 @@ class Comparison:
         order = np.argsort(key, kind='stable')
         return key[order], _join(weights, np.float64)[order], _join(owners, np.int64)[order]
 
-
     def with_credit(self, keeps: Keeps) -> Comparison:
         """
         Return the same comparison with part of its ``credit``.

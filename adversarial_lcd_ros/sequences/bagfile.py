@@ -294,7 +294,7 @@ def _check_free(destination: Path, overwrite: bool) -> None:
         return
     if not overwrite:
         raise SequenceError(f'{destination} exists already: remove it, give another name, or '
-                            'ask to overwrite it')
+                            'replace it (--overwrite)')
     if not (destination / METADATA).is_file():
         raise SequenceError(f'{destination} exists and is no bag (it has no {METADATA}): it is '
                             'not overwritten')

@@ -23,14 +23,8 @@ from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.digests import model_digests
-from adversarial_lcd_ros.evaluation.metrics import (
-    Metrics,
-    first_closure_latency_s,
-    measure,
-    outcomes,
-    right,
-    told_kind,
-)
+from adversarial_lcd_ros.evaluation.metrics import Metrics, first_closure_latency_s, measure
+from adversarial_lcd_ros.evaluation.outcomes import outcomes, right, told_kind
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
@@ -54,7 +48,7 @@ from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 # Of the row's columns; a change in the code below makes rows again by itself.
 KIND, SCHEMA = 'targets', 5
 _CODE = ('lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
-         'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
+         'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics', 'evaluation/outcomes',
          'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')
 

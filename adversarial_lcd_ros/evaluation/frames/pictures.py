@@ -19,7 +19,7 @@ from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult, attack_f
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
-from adversarial_lcd_ros.evaluation.metrics import EFFECTS
+from adversarial_lcd_ros.evaluation.outcomes import EFFECTS
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs

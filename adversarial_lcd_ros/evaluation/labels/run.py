@@ -17,7 +17,7 @@ from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.labels.check import check_labels
 from adversarial_lcd_ros.evaluation.labels.page import PicturePair, write_page
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS
 from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import Labelled, Views, label_views
@@ -60,21 +60,22 @@ def open_views(source: str) -> Opened:
     part = SequencePart.parse(source)
     if holds_graphs(part.path):
         graphs = open_graphs(source, BuilderConfig())
+        trajectory = _known(graphs.trajectory, source, 'no ground truth')
         views = Views(np.array([graph.stamp_ns for graph in graphs.graphs], np.int64),
-                      graphs.image_size, _known(graphs.trajectory, source), part.path,
-                      graphs.graphs)
+                      graphs.image_size, trajectory, part.path, graphs.graphs)
         return Opened(graphs.name, views, None)
     sequence = open_sequence(part.path)
     numbers = part.numbers(sequence.frame_count)
     views = Views(sequence.stamps_ns[numbers.start:numbers.stop], sequence.image_size,
-                  _known(sequence.trajectory, source), part.path)
+                  _known(sequence.trajectory, source, str(sequence.coverage)), part.path)
     return Opened(sequence.name, views, None if sequence.detections else sequence)
 
 
-def _known(trajectory: Trajectory | None, source: str) -> Trajectory:
+def _known(trajectory: Trajectory | None, source: str, reason: str) -> Trajectory:
     if trajectory is None:
-        raise EvaluationError(f'{source} has no ground truth: without it nobody knows what is a '
-                              'loop')
+        raise EvaluationError(f'{source}: {reason}; by it loops are known: name it with '
+                              '--ground-truth, or go on without labels: "adversarial-lcd '
+                              'evaluate" then counts the decisions that change')
     return trajectory
 
 

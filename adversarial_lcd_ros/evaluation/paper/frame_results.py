@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, UNTOLD_MATCH, right
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS, UNTOLD_MATCH, right
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.metrics import Outcomes, balanced_accuracy, effect, outcomes
+from adversarial_lcd_ros.evaluation.metrics import balanced_accuracy, effect
+from adversarial_lcd_ros.evaluation.outcomes import Outcomes, outcomes
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
 from adversarial_lcd_ros.files.writing import write_csv
 from adversarial_lcd_ros.ground_truth.labels import (

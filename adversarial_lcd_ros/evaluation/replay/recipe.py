@@ -13,7 +13,9 @@ from typing import Any
 from adversarial_lcd_ros.attack.images.posting import spans_in
 from adversarial_lcd_ros.config import AttackConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.evaluation.methods import attack_columns, used_settings
 from adversarial_lcd_ros.evaluation.recipes import LIVE, read_recipe
+from adversarial_lcd_ros.evaluation.wording import attack_title
 from adversarial_lcd_ros.registry import NONE
 
 MAX_ATTACKS = 1000
@@ -44,6 +46,10 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> ReplayRecipe:
     """
     Return the attacks of a recipe, and the posters that hang while they run.
 
+    Where overrides make another attack of one, such as another search, it is called by its
+    settings: its name in the recipe would tell of what did not run. Attacks that overrides make
+    the same run once.
+
     Parameters
     ----------
     name : str
@@ -64,20 +70,35 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> ReplayRecipe:
                           'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
     if set(content) != {'attacks'}:
         raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
-    attacks: dict[str, AttackConfig] = {}
-    posters: dict[str, dict[str, Any]] = {}
+    names, attacks, posters = {'clean'}, dict[str, AttackConfig](), dict[str, dict[str, Any]]()
     for entry in content['attacks']:
         title = _run_name(path, entry)
-        if title in attacks or title == 'clean':
+        if title in names:
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
+        names.add(title)
         settings = {name: value for name, value in entry.items() if name not in ('name', REPLAY)}
-        attacks[title] = AttackConfig.from_mapping({**settings, **overrides})
+        attack = AttackConfig.from_mapping({**settings, **overrides})
         if REPLAY in entry:
             posters[title] = _poster(f'recipe {path}, {title}', entry[REPLAY])
+        else:  # what a poster does hangs on no setting of the attacker
+            if overrides and used_settings(attack) in map(used_settings, attacks.values()):
+                continue
+            title = _title(title, AttackConfig.from_mapping(settings), attack, attacks)
+        attacks[title] = attack
     if len(attacks) > MAX_ATTACKS:
         raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
                           f'expected at most {MAX_ATTACKS}')
     return ReplayRecipe(attacks, posters)
+
+
+def _title(title: str, meant: AttackConfig, attack: AttackConfig,
+           taken: Mapping[str, AttackConfig]) -> str:
+    """Return what an attack is called that the recipe calls by a title and means so."""
+    runs = {'mode': attack.mode, **attack_columns(attack)}
+    if runs == {'mode': meant.mode, **attack_columns(meant)}:
+        return title
+    by_settings = attack_title(runs)
+    return f'{by_settings} (in place of {title})' if by_settings in taken else by_settings
 
 
 def _run_name(path: Path, entry: Any) -> str:

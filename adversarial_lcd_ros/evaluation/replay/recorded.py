@@ -19,10 +19,10 @@ from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figures
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.pictures import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.supervision import Tell
-from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence

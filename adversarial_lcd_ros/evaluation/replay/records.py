@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import EvaluationError, FileError
-from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
+from adversarial_lcd_ros.evaluation.outcomes import EFFECTS, outcomes
 from adversarial_lcd_ros.files.reading import csv_rows
 from adversarial_lcd_ros.files.writing import plain_cell, write_csv
 from adversarial_lcd_ros.ground_truth.labels import (

@@ -28,6 +28,7 @@ from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figures
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
+from adversarial_lcd_ros.evaluation.replay.pictures import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.recipe import POSTERS
@@ -35,7 +36,6 @@ from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.report import write_results
 from adversarial_lcd_ros.evaluation.replay.supervision import Tell
-from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
     finished_in_s,
