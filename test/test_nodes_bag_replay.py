@@ -332,9 +332,11 @@ def test_a_missing_bag_is_an_error(ros, tmp_path):
         replay(ros, str(tmp_path / 'nowhere'))
 
 
+@pytest.mark.parametrize(('sheets', 'share'), [(1, 0.3), (2, 0.2)])
 def test_a_poster_is_in_the_graphs_of_its_span_as_offline(ros, bag, frames, pipeline, vocabulary,
-                                                          tmp_path):
-    settings = {'poster': 'cells', 'poster_share': 0.3, 'poster_spans': '0.3:0.9'}
+                                                          tmp_path, sheets, share):
+    settings = {'poster': 'cells', 'poster_share': share, 'poster_sheets': sheets,
+                'poster_spans': '0.3:0.9'}
     node = replay(ros, bag, lockstep=True, record=str(tmp_path / 'record'), **settings)
     assert node.work(ros.spin) == 0
     ros.stop(node)

@@ -65,6 +65,7 @@ def test_posters_of_the_recipe_that_ships_hang_in_places_that_certainly_differ()
     ('{poster: cells}', 'hangs no poster'), ('{poster_spans: "1:2"}', 'hangs no poster'),
     ('{poster: cells, poster_spans: "2:1"}', 'FROM:TO'),
     ('{poster: cloth, poster_spans: "1:2"}', 'cloth'),
+    ('{poster: cells, poster_spans: "1:2", poster_sheets: 2, poster_share: 0.4}', 'overlap'),
     ('{poster_size: 3}', 'poster_size')])
 def test_wrong_posters_are_refused(tmp_path, replay, said):
     path = tmp_path / 'recipe.yaml'
@@ -102,7 +103,8 @@ def test_a_poster_hangs_in_its_run_alone(tmp_path, kept_runs):
     assert summary['graphs_rebuilt_differently'] == {'a': 0}
     assert json.loads((folder / 'configuration.json').read_text())['posters'] == {'p': HUNG}
     row = json.loads((folder / 'summary.json').read_text())['rows'][1]
-    assert row['poster'] == {'kind': 'cells', 'share': 0.3, 'spans': '6:8, 18:20'}
+    assert row['poster'] == {'kind': 'cells', 'share': 0.3, 'sheets': 1,
+                             'spans': '6:8, 18:20'}
 
 
 def test_what_a_poster_takes_is_not_told_as_an_attack_on_messages():

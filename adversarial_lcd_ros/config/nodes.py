@@ -43,7 +43,10 @@ class ReplayConfig(Config):
         NONE, 'A poster that is pasted into frames on their way to graph_builder: cells, noise or '
         'a chessboard.', choices=POSTERS)
     poster_share: float = setting(
-        0.05, 'Poster: share of the frame that it covers.', low=0.001, high=1.0)
+        0.05, 'Poster: share of the frame that it covers, two sheets together.', low=0.001,
+        high=1.0)
+    poster_sheets: int = setting(
+        1, 'Poster: sheets; two hang in opposite corners of one square.', low=1, high=2)
     poster_spans: str = setting(
         '', 'Poster: when it is seen, FROM:TO in seconds of the bag, several between commas.')
     poster_seed: int = setting(

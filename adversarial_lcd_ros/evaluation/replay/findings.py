@@ -157,7 +157,8 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
 def _effort(summary: Mapping[str, Any], attack: Attack) -> str:
     if _is_scene_alone(attack):
         hung = attack['poster']
-        return (f'a poster of {percent(hung["share"], 0)} of the frame ({hung["kind"]}) at '
+        what = 'two posters over' if hung.get('sheets') == 2 else 'a poster of'
+        return (f'{what} {percent(hung["share"], 0)} of the frame ({hung["kind"]}) at '
                 f'{hung["spans"].replace(",", " and")} s, and no message changed')
     if attack.get('nodes_moved_mean'):
         return (f'{mean_count(attack["nodes_moved_mean"])} of {number(summary["nodes_mean"], 0)} '

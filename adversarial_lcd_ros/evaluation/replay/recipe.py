@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.attack.images.posting import spans_in
+from adversarial_lcd_ros.attack.images.posting import Posting, spans_in
 from adversarial_lcd_ros.config import AttackConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.methods import attack_columns, used_settings
@@ -122,4 +122,5 @@ def _poster(where: str, settings: Any) -> dict[str, Any]:
     if hung.poster == NONE or not spans_in(hung.poster_spans):
         raise ConfigError(f'{where}: {REPLAY} hangs no poster: expected poster, and poster_spans, '
                           'when it is seen')
+    Posting(hung, 0)  # two sheets may overlap
     return settings

@@ -138,7 +138,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
         if attack['name'] in plan.posters:
             hung = plan.replay_of(attack['name'])
             attack['poster'] = {'kind': hung.poster, 'share': hung.poster_share,
-                                'spans': hung.poster_spans}
+                                'sheets': hung.poster_sheets, 'spans': hung.poster_spans}
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()
         if name not in plan.posters}

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from adversarial_lcd_ros.attack.images.poster import TWO_SPAN
 from adversarial_lcd_ros.config import (
     POSTERS,
     BuilderConfig,
@@ -63,7 +64,7 @@ class PosterConfig(Config):
                          'controls, at the last share but where two hang.')
     two_share: float = setting(
         0.1, 'Share of two posters together, in opposite corners; 0: none hang.', low=0.0,
-        high=0.5)
+        high=TWO_SPAN / 2)
     seed: int = setting(42, 'Seed of pairs, textures, places and light.', low=0, high=2**31 - 1)
 
 
