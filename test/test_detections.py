@@ -88,11 +88,17 @@ def test_rows_are_read_exactly_and_in_order_of_time(tmp_path):
     (line(score='nan'), 'line 3: score'),
     ('soon' + line()[4:], 'line 3: .* no number of seconds'),
     ('-1' + line()[20:], 'line 3: .* no time stamp'),
-    ('"' + line(), 'cannot be read as CSV'),
-    ('', 'line 3: 0 fields')])
+    (line(box=(1e300, 2, 3, 4)), r'line 3: box 1e\+300,.* of at most 1e\+09'),
+    ('"' + line(), 'cannot be read as CSV')])
 def test_wrong_lines_are_named(tmp_path, wrong, said):
     with pytest.raises(SequenceError, match=said):
         read_detections(table(tmp_path / 'd.csv', line(), wrong, line()))
+
+
+def test_blanks_behind_commas_and_blank_lines_do_not_matter(tmp_path):
+    found = read_detections(table(tmp_path / 'd.csv', line().replace(',', ', '), '',
+                                  line(STAMP_NS + 1), '', header=HEADER.replace(',', ', ')))
+    assert found.stamp_ns.tolist() == [STAMP_NS, STAMP_NS + 1]
 
 
 @pytest.mark.parametrize(('text', 'said'), [

@@ -25,7 +25,7 @@ from test_nodes_bag_replay import (  # noqa: F401
 )
 
 from adversarial_lcd_ros.nodes.lcd import LcdNode
-from adversarial_lcd_ros.nodes.peers import getting_ready
+from adversarial_lcd_ros.nodes.peers import Listening, getting_ready
 from adversarial_lcd_ros.nodes.runtime import Manual, PipelineNode
 
 
@@ -98,6 +98,12 @@ def test_a_replay_waits_until_the_others_know_who_hears_them(
                         SimpleNamespace(monotonic=lambda: real_s() + ahead_s))
     assert node.work(spin) == 0
     assert published == [0]
+
+
+def test_what_a_replay_publishes_itself_is_not_asked_about(ros, bag, pipeline):  # noqa: F811
+    node = replay(ros, bag)
+    ros.until(lambda: node.count_subscribers('image/compressed'))
+    assert Listening(node, ['image/compressed']).lacking() == ''
 
 
 def test_a_second_detector_fails_a_recording_and_is_named(

@@ -72,6 +72,7 @@ class Listening:
         """Name a topic that somebody is not yet heard on by all; empty where none is known."""
         telling = {_full_name(one) for one in
                    self._node.get_publishers_info_by_topic(DIAGNOSTICS)}
+        telling.discard(self._node.get_fully_qualified_name())  # it knows its own listeners
         for topic in self._topics:
             wanted = self._node.count_subscribers(topic)
             for one in self._node.get_publishers_info_by_topic(topic):

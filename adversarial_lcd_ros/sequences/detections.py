@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 import csv
 from dataclasses import dataclass
-import math
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +23,8 @@ COLUMNS = ('timestamp', 'class', 'x', 'y', 'w', 'h', 'score')
 # What published files call the class.
 _CLASS_COLUMNS = ('class', 'coco_class')
 MAX_CLASS = SCENE_CLASS - 1
+# Boxes may reach beyond an image, but not beyond float32.
+_MAX_PX = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +102,14 @@ def _rows(path: Path) -> Iterator[tuple[int, int, float, float, float, float, fl
         lines = csv.reader(read_text(path).splitlines(), strict=True)
         _check_header(path, next(lines, []))
         for fields in lines:
-            yield _row(f'{path}, line {lines.line_num}', fields)
+            if fields:  # no blank line
+                yield _row(f'{path}, line {lines.line_num}', fields)
     except csv.Error as error:
         raise SequenceError(f'{path} cannot be read as CSV: {error}') from error
 
 
 def _check_header(path: Path, header: list[str]) -> None:
-    names = ['class' if name in _CLASS_COLUMNS else name for name in header]
+    names = ['class' if name in _CLASS_COLUMNS else name for name in map(str.strip, header)]
     if names != list(COLUMNS):
         raise SequenceError(f'{path}, line 1: found {",".join(header) or "nothing"}; expected '
                             f'the header {",".join(COLUMNS)}')
@@ -124,9 +126,10 @@ def _row(where: str, fields: list[str]) -> tuple[int, int, float, float, float, 
         raise SequenceError(f'{where}: {error}') from None
     if not 0 <= label <= MAX_CLASS:
         raise SequenceError(f'{where}: class {label}; expected 0 to {MAX_CLASS}')
-    if not all(map(math.isfinite, (x, y, width, height))) or min(width, height) <= 0:
-        raise SequenceError(f'{where}: box {",".join(fields[2:6])}; expected finite numbers, and '
-                            'a width and height above 0')
+    if (not all(abs(value) <= _MAX_PX for value in (x, y, width, height))
+            or min(width, height) <= 0):
+        raise SequenceError(f'{where}: box {",".join(fields[2:6])}; expected finite numbers of at '
+                            f'most {_MAX_PX:g}, and a width and height above 0')
     if not 0 <= score <= 1:
         raise SequenceError(f'{where}: score {fields[6]}; expected 0 to 1')
     return stamp_ns, label, x, y, width, height, score
