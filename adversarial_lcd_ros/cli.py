@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import os
 import signal
 import sys
+from typing import TextIO
 
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.start import ignore_signals, interruptible, write_plainly
@@ -32,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     ----------
     argv : sequence of str, optional
         Command line without the program. That of the process if not given: then the process is
-        taken to be this command's own, and ends within two seconds of a signal.
+        taken to be this command's own, and ends within three seconds of a signal.
 
     """
     before = signal.getsignal(signal.SIGTERM)
@@ -70,7 +71,7 @@ def _run(argv: Sequence[str] | None) -> int:
         return _refuse(with_options(str(error), options))
     except BrokenPipeError:
         # Whoever read our output has enough of it; nothing more can be written, also at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence(sys.stdout)
         return EXIT_ERROR
     except OSError as error:
         return _refuse(f'{error}; what was finished before is kept')
@@ -79,13 +80,21 @@ def _run(argv: Sequence[str] | None) -> int:
     return EXIT_OK
 
 
+def _silence(stream: TextIO) -> None:
+    """Let what is left in a stream go nowhere: it is flushed at exit, too."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def _refuse(reason: str) -> int:
+    from adversarial_lcd_ros.files.text import printable
+
     # What is wrong with an input may quote it: not at any length, nor with control characters.
     line = ' '.join(reason.split())
     line = line if len(line) <= _MAX_ERROR else f'{line[:_MAX_ERROR]} ...'
-    shown = ''.join(character if character.isprintable() else ascii(character)[1:-1]
-                    for character in line)
-    print(f'error: {shown}', file=sys.stderr)
+    try:
+        print(f'error: {printable(line)}', file=sys.stderr, flush=True)
+    except OSError:  # nobody can be told; the exit code remains
+        _silence(sys.stderr)
     return EXIT_ERROR
 
 

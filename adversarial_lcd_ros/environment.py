@@ -36,8 +36,6 @@ _DISTRIBUTIONS = {
     'onnxruntime': ('onnxruntime', 'onnxruntime-gpu'), 'rosbags': ('rosbags',),
     'mcap': ('mcap',), 'rclpy': ('ros-jazzy-rclpy', 'rclpy'), 'matplotlib': ('matplotlib',),
     'gtsam': ('gtsam',)}
-
-
 _HERE = Path(__file__).resolve().parent
 _GIT_S = 10.0
 

@@ -73,7 +73,6 @@ paddle2onnx.export(*sys.argv[2:5], opset_version=int(sys.argv[5]))
 """
 
 
-
 def fetch_object_model(destination: Path | None = None,
                        progress: Callable[[str], None] | None = None, *,
                        anew: bool = False) -> Path:

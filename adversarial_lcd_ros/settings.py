@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Settings on the command line and in YAML files, made from config.py.
+Settings on the command line and in YAML files, made from adversarial_lcd_ros.config.
 
 One file serves nodes and commands: what ``config/params.yaml`` gives a node as parameters, the
 commands read as settings (``--config``). The command line wins over the file, the file over the
@@ -224,6 +224,13 @@ def add_models_option(parser: ArgumentParser) -> None:
     parser.add_argument('--models', type=Path, metavar='FOLDER',
                         help='what "train" has written, in place of the models that ship; '
                         'settings of single files win over it')
+
+
+def add_config_option(parser: ArgumentParser, of: str = '') -> None:
+    """Give a parser the option ``--config``: a file of settings, all or those of some nodes."""
+    parser.add_argument('--config', type=Path, metavar='FILE',
+                        help=f'settings (YAML){of and f" of {of}"}; options of the command line '
+                        'win over it')
 
 
 def chosen_settings(options: Namespace, config_class: type[Config]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import ClassVar
 # Where the ranks of what is not the paper's, and of ours, begin.
 OTHERS_RANK, OURS_RANK = 20, 100
 
+
 class Shown:
     """
     What has a name, and a place in tables and plots.

@@ -29,7 +29,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SUPERVISOR = 'ADVERSARIAL_LCD_SUPERVISOR'
 # Set where nothing but results, warnings and errors is to be said.
 QUIET = 'ADVERSARIAL_LCD_QUIET'
-_GRACE_S = 1.5
+_GRACE_S = 3.0
 _PR_SET_PDEATHSIG = 1
 _PLAIN: Mapping[str, str] = {'\u202f': ' ', '\u00a0': ' ', '–': '-', '−': '-', '→': '->', '×': 'x',
                              '…': '~'}
@@ -41,7 +41,7 @@ def interruptible(exit_code: int) -> None:
     """
     Let the first SIGINT or SIGTERM raise KeyboardInterrupt, and ignore the others.
 
-    Some code swallows exceptions, and some clean-ups take long: what has not ended 1.5 s after
+    Some code swallows exceptions, and some clean-ups take long: what has not ended 3 s after
     the signal is cut off.
 
     Parameters
@@ -58,6 +58,10 @@ def interruptible(exit_code: int) -> None:
         raise KeyboardInterrupt
     for number in SIGNALS:
         signal.signal(number, interrupt)
+    # What calls back from C, as compiling does, swallows it too, and would print a traceback.
+    told = sys.unraisablehook
+    sys.unraisablehook = lambda found: (
+        None if issubclass(found.exc_type, KeyboardInterrupt) else told(found))
 
 
 def _leave() -> None:
@@ -82,13 +86,30 @@ def ignore_signals() -> None:
 
 
 def write_plainly() -> None:
-    """Let stdout and stderr replace what their encoding lacks: a terminal need not be UTF-8."""
+    """
+    Let stdout and stderr replace what their encoding lacks: a terminal need not be UTF-8.
+
+    Where one was closed, what is written to it goes nowhere; its number would else be that of the
+    next file that is opened.
+    """
+    _open_closed()
     codecs.register_error(_ERRORS, _replace)
     for stream in (sys.stdout, sys.stderr):
         # Some programs put streams of their own there, or none.
         reconfigure = getattr(stream, 'reconfigure', None)
         if reconfigure is not None:
             reconfigure(errors=_ERRORS)
+
+
+def _open_closed() -> None:
+    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, 'r' if number == 0 else 'w', encoding='utf-8',
+                                    closefd=False))
 
 
 def _replace(error: UnicodeError) -> tuple[str, int]:

@@ -11,7 +11,8 @@ import pytest
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError
 from adversarial_lcd_ros.paths import model_path, object_model_path
-from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble
+from adversarial_lcd_ros.vision.assembly import assemble
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 from adversarial_lcd_ros.vision.features import FeatureExtractor, spread, to_grey
 from adversarial_lcd_ros.vision.objects import ObjectDetector, filter_objects
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary

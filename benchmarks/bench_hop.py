@@ -24,7 +24,6 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import UInt8MultiArray
 
-from adversarial_lcd_ros.config import PERTURBATIONS
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
 from adversarial_lcd_ros.evaluation.replay.processes import node_environment
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -36,6 +35,7 @@ from adversarial_lcd_ros.nodes.bag_replay import BagReplayNode
 from adversarial_lcd_ros.nodes.endpoints import payload_qos
 from adversarial_lcd_ros.nodes.lcd import LcdNode
 from adversarial_lcd_ros.nodes.runtime import make_executor
+from adversarial_lcd_ros.registry import PERTURBATIONS
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 
 PERIOD_S = 1 / 30

@@ -31,7 +31,7 @@ from adversarial_lcd_ros.lcd.targets.symbio import SymbioTarget
 from adversarial_lcd_ros.lcd.views import View
 from adversarial_lcd_ros.training.decisions import TrainingSequence, training_pairs
 from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer, fit_decision
-from adversarial_lcd_ros.training.run import TRAINING_LABELS
+from adversarial_lcd_ros.training.plan import TRAINING_LABELS
 
 RATIO, SEED = 3e-4, 7
 DESIGNS = [(iterations, 0.5) for iterations in (1, 2, 3, 4)] + [(3, 0.0), (3, 0.25), (3, 1.0)]

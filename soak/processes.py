@@ -24,8 +24,8 @@ from soak.outcome import Outcome
 
 COUNTS = {'full_disk': 30, 'killed': 30, 'two_at_once': 5}
 ROOT = Path(__file__).resolve().parents[1]
-_TIMEOUT_S = 300.0
-_GONE_S = 5.0
+_TIMEOUT_S = 600.0
+_GONE_S = 60.0
 # All that a trial starts has it in its environment, and is found by it.
 _MARK = 'ADVERSARIAL_LCD_SOAK'
 _TOUR = ROOT / 'bags' / 'flat_tour'

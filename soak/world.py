@@ -21,9 +21,9 @@ from adversarial_lcd_ros.messages.codec import decode_graph, decode_loop_closure
 from adversarial_lcd_ros.messages.payload import unwrap
 from soak.outcome import Outcome
 
-_READY_S, _END_S = 120.0, 20.0
-# Diagnostics come once a second.
-STATUS_S = 5.0
+_READY_S, _END_S = 300.0, 60.0
+# Diagnostics come once a second, where the machine is not busy.
+_STATUS_S = 60.0
 # What a node hears, the topic of its work first; and where its work comes out.
 HEARS = {'lcd': ('graph', 'query'), 'attacker': ('graph_clean', 'answer'),
          'graph_builder': ('image', 'image/compressed')}
@@ -107,7 +107,7 @@ class World:
         while before != self._work():
             before, told = self._work(), self.statuses
             if not self.until(lambda told=told: self.statuses > told + 1,  # type: ignore[misc]
-                              STATUS_S):
+                              _STATUS_S):
                 return
 
     def _work(self) -> dict[str, str]:

@@ -64,6 +64,17 @@ class RefusesEven(Defence):
         return (0.0, 0.5, 2.0)[match.stamp_ns // 10**9 % 3]
 
 
+class CountsPreparations(Defence):
+    """Judges a graph with one edge flipped, and tells how many it was asked for."""
+
+    name = 'counts_preparations'
+    asked = 0
+
+    def prepare(self, graph):
+        self.asked += 1
+        return graph.flip([(0, 1)])
+
+
 class MovesNodes(Defence):
     """Does what no defence may."""
 

@@ -11,7 +11,8 @@ import zlib
 
 import numpy as np
 
-from adversarial_lcd_ros.evaluation.metrics import effect, right
+from adversarial_lcd_ros.evaluation.metrics import effect
+from adversarial_lcd_ros.evaluation.outcomes import right
 
 SEQUENCES = ('synthetic_tour', 'synthetic_kitchen', 'synthetic_desk', 'synthetic_office')
 # Chance that an attack turns a right decision over, at r = 3e-4; made up.

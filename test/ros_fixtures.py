@@ -11,7 +11,8 @@ import pytest
 # Read by the message classes when they are imported: a wrong type is an error, not garbage.
 os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')
 
-DEADLINE_S = 20.0
+# Generous: the machine may be busy. What hangs would hang for ever.
+DEADLINE_S = 60.0
 
 
 class Ros:

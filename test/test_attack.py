@@ -6,6 +6,7 @@
 from dataclasses import replace
 import math
 import time
+from types import SimpleNamespace
 
 from graph_factory import flips_of, graphs, make_graph
 from hypothesis import given, settings
@@ -285,12 +286,21 @@ def test_a_detector_that_falls_silent_gets_the_best_so_far(answers):
     assert len(result.flips) <= result.edit_budget
 
 
-def test_the_deadline_ends_the_search():
-    detector = SecretDetector(GRAPH, start=50.0)
-    result = Attacker(AttackConfig(ratio=1.0, queries_per_edit=10_000, deadline_ms=20.0)).process(
-        GRAPH, detector)
+def test_the_deadline_ends_the_search(monkeypatch):
+    detector, asked = SecretDetector(GRAPH, start=50.0), []
+
+    def ask(graph):
+        asked.append(graph)
+        return detector(graph)
+
+    # Each answer takes two seconds.
+    clock = SimpleNamespace(monotonic=lambda: 2.0 * len(asked))
+    for module in ('attacker', 'deadline', 'oracle'):
+        monkeypatch.setattr(f'adversarial_lcd_ros.attack.{module}.time', clock)
+    result = Attacker(AttackConfig(ratio=1.0, queries_per_edit=10_000, deadline_ms=19_000.0)
+                      ).process(GRAPH, ask)
     assert result.reason == 'deadline'
-    assert 0 < result.queries < result.query_budget
+    assert result.queries == len(asked) == 10
 
 
 @given(graphs(), st.integers(0, 2**16))
@@ -465,3 +475,13 @@ def test_any_callable_may_answer(said, is_loop, is_soft):
 def test_what_is_no_answer_is_an_error(said):
     with pytest.raises(AdversarialLcdError, match='expected a probability'):
         as_answer(said)
+
+
+@pytest.mark.filterwarnings('error')
+def test_features_of_any_scores_are_numbers():
+    """The schema bounds scores of features from below alone."""
+    score = np.linspace(0, 3e38, GRAPH.node_count).astype(np.float32)
+    score[:GRAPH.object_count] = 0.5
+    x = node_features(replace(GRAPH, score=score))
+    assert np.isfinite(x).all()
+    assert np.ptp(x[GRAPH.object_count:, 4]) > 1

@@ -15,7 +15,8 @@ from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import GraphError, ModelError
 from adversarial_lcd_ros.graph import SCENE_CLASS
 from adversarial_lcd_ros.messages import codec
-from adversarial_lcd_ros.vision.builder import GraphBuilder, assemble, in_variant
+from adversarial_lcd_ros.vision.assembly import assemble, in_variant
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 from adversarial_lcd_ros.vision.features import Features
 from adversarial_lcd_ros.vision.objects import Detections
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.errors import GraphError
-from adversarial_lcd_ros.vision.draw import draw_attack, draw_decision, draw_graph
+from adversarial_lcd_ros.vision.draw import OBJECT, draw_graph
+from adversarial_lcd_ros.vision.panels import draw_attack, draw_decision
 
 FRAME = np.full((480, 640, 3), 128, np.uint8)
 PLACES = np.array([(320, 100), (100, 300), (540, 300), (300, 440), (40, 40), (600, 60)],
@@ -65,10 +66,8 @@ def test_graphs_without_nodes_and_unknown_classes_are_drawn():
 
 
 def test_the_scene_is_a_tag_in_the_middle_without_a_box():
-    from adversarial_lcd_ros.vision.draw import _OBJECT
-
     graph = with_scene(make_graph(5, (), 0, position=PLACES[1:]))
-    of_object = (draw_graph(FRAME, graph, legend=False) == _OBJECT).all(axis=2)
+    of_object = (draw_graph(FRAME, graph, legend=False) == OBJECT).all(axis=2)
     y, x = np.nonzero(of_object)
     assert len(y) > 100
     assert np.abs(y - 240).max() < 20
@@ -76,14 +75,12 @@ def test_the_scene_is_a_tag_in_the_middle_without_a_box():
 
 
 def test_tags_of_boxes_at_one_place_do_not_hide_each_other():
-    from adversarial_lcd_ros.vision.draw import _OBJECT
-
     def tag_area(objects):
         same = np.repeat(PLACES[:1], 6, axis=0)
         picture = draw_graph(FRAME, make_graph(
             6, (), objects, position=same, size=np.full((6, 2), 60, np.float32),
             label=np.full(6, 56, np.uint32)), legend=False)
-        return (picture == _OBJECT).all(axis=2).sum()
+        return (picture == OBJECT).all(axis=2).sum()
     assert tag_area(3) > 2.5 * tag_area(1)
 
 
@@ -134,3 +131,11 @@ def test_a_decision_shows_the_match_beside_and_the_verdict_below(is_loop):
     assert red.any()
     coloured = np.ptp(shown[390:420].astype(int), axis=2).max()
     assert (coloured > 100) == is_loop
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('size', [1e30, 3e38, 1e-45])
+def test_boxes_of_any_size_are_drawn(size):
+    graph = scene()
+    drawn = draw_graph(FRAME, replace(graph, size=np.full_like(graph.size, size)))
+    assert drawn.shape == FRAME.shape

@@ -14,7 +14,7 @@ import pytest
 
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, SequenceError
-from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.sequences import import_sequence, open_sequence
 from adversarial_lcd_ros.sequences.encodings import KNOWN, message_pixels
 from adversarial_lcd_ros.sequences.replay import Replay
 
@@ -182,3 +182,13 @@ def test_a_video_stream_is_named(tmp_path):
             for stamp in make.stamps()]
     with pytest.raises(SequenceError, match=r"format 'h264'.* neither a JPEG"):
         open_sequence(make.write_ros2(tmp_path / 'bag', rows))
+
+
+def test_sixteen_bits_of_grey_are_a_camera_in_the_imported_bag_too(tmp_path):
+    """There is no room for mono16 in its format: as 16 bits they would be taken for depth."""
+    grey = (cv2.cvtColor(make.picture(1), cv2.COLOR_BGR2GRAY) * np.uint16(257))
+    rows = [('/ir', make.COMPRESSED, stamp, make.ROS2.compressed(
+        stamp, make.encoded(grey, '.png'), 'mono16; png compressed ')) for stamp in make.stamps()]
+    import_sequence(make.write_ros2(tmp_path / 'bag', rows), tmp_path / 'imported', raw_as='png')
+    frame = next(open_sequence(tmp_path / 'imported').frames())
+    assert np.abs(frame.image()[:, :, 0].astype(int) - grey // 257).max() <= 1

@@ -120,6 +120,15 @@ def test_a_sequence_without_ground_truth_is_refused(tmp_path, command, capsys):
     assert 'no ground truth' in capsys.readouterr().err
 
 
+def test_wrong_posters_are_told_before_a_sequence_is_looked_at(tmp_path, capsys):
+    recipe = tmp_path / 'rings.yaml'
+    recipe.write_text('{protocol: rings, attacks: [{search: recall}], posters: {pairs: 0}}')
+    assert main(['evaluate', str(tmp_path / 'none'), '--recipe', str(recipe), '--output',
+                 str(tmp_path / 'out')]) == 2
+    assert 'posters: PosterConfig.pairs = 0: expected 1' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     (['a', 'b'], 'replays one bag, found 2'), (['a', '--jobs', '2'], '--jobs'),
     (['a', '--seeds', '2'], '--seeds'), (['a', '--scheduler', 'tcp://x:1'], '--scheduler')])

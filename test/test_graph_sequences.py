@@ -14,13 +14,14 @@ import pytest
 from walk_factory import walk_folder
 
 from adversarial_lcd_ros.config import BuilderConfig
-from adversarial_lcd_ros.errors import EvaluationError, SequenceError
+from adversarial_lcd_ros.errors import CodecError, EvaluationError, SequenceError
 from adversarial_lcd_ros.graph_sequences import cache
 from adversarial_lcd_ros.graph_sequences import opening as graph_sequences
 from adversarial_lcd_ros.graph_sequences.cache import load_graphs, save_graphs
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.sequences import open_sequence
+from adversarial_lcd_ros.sequences.inspection import inspect_bag
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 PAYLOAD = 'std_msgs/msg/UInt8MultiArray'
@@ -185,3 +186,13 @@ def test_the_key_of_kept_graphs_knows_the_code_that_built_them(tmp_path, config,
         monkeypatch.setattr(cache, 'code_digest', lambda *places, code=code: code)
         keys.append(cache.cache_key(sequence, range(2), config))
     assert len(set(keys)) == 2
+
+
+def test_a_payload_that_is_refused_is_named_by_its_place(tmp_path, config):
+    rows = list(graph_rows('/graph', 3))
+    topic, kind, stamp, message = rows[1]
+    rows[1] = topic, kind, stamp, type(message)(message.layout, message.data[:-8])
+    bag = make.write_ros2(tmp_path / 'bag', rows)
+    for read in (lambda: open_graphs(str(bag), config), lambda: inspect_bag(bag)):
+        with pytest.raises(CodecError, match=r'bag .*/bag, message 1 on /graph: '):
+            read()

@@ -209,6 +209,8 @@ FIRST, SECOND, THIRD, FOURTH = stamps(COUNT)
     ((5_000_000_000, 5_033_333_333, THIRD, FOURTH), 'frames 1 and 2 the clock .* jumps by 13'),
     ((FIRST, SECOND, THIRD + 10**12, FOURTH + 10**12), r'jumps by 1000\.0 s'),
     ((0, 0, 0, 0), 'all 4 frames are stamped 0'),
+    ([stamp // 1000 for stamp in stamps(COUNT)], r'0\.000100 s pass .* 0\.100000 s'),
+    ([stamp // 10**6 for stamp in stamps(COUNT)], 'stamps in milliseconds or microseconds'),
     ((FIRST, SECOND, SECOND, FOURTH), 'frame 2, at .* does not follow'),
     ((FIRST, THIRD, SECOND, FOURTH), 'frame 2, at .* does not follow')])
 def test_wrong_stamps_of_frames_are_named_and_log_times_help(tmp_path, frames_ns, said):

@@ -16,7 +16,6 @@ from adversarial_lcd_ros.ground_truth.labels import (
     BY_POSES,
     NO_MATCH,
     label_frames,
-    relation,
 )
 from adversarial_lcd_ros.ground_truth.overlap import GRID_POINTS, visible_points
 from adversarial_lcd_ros.ground_truth.pairs import sample_pairs
@@ -45,6 +44,10 @@ def path(yaw_deg, x_m=None, period_s=1.0):
     position[:, 0] = 0.0 if x_m is None else x_m
     stamps = (np.arange(count) * period_s * 1e9).astype(np.int64)
     return Poses(stamps, position, turning(np.asarray(yaw_deg, float)[:, None]))
+
+
+def relation_of(poses, size, config):
+    return label_frames(poses, poses.stamp_ns, size, config).relation
 
 
 def overlap(position, quaternion):
@@ -110,11 +113,11 @@ def test_quaternion_that_is_no_rotation_is_named():
 
 
 def test_loop_needs_the_camera_to_have_looked_elsewhere():
-    still = relation(path([0.0] * 30), SIZE, LabelConfig(rule='overlap', min_gap_s=5.0))
+    still = relation_of(path([0.0] * 30), SIZE, LabelConfig(rule='overlap', min_gap_s=5.0))
     assert not still.any()
     # Away for frames 10 to 19, then back.
-    back = relation(path([0.0] * 10 + [180.0] * 10 + [0.0] * 10), SIZE,
-                    LabelConfig(rule='overlap', min_gap_s=5.0))
+    back = relation_of(path([0.0] * 10 + [180.0] * 10 + [0.0] * 10), SIZE,
+                       LabelConfig(rule='overlap', min_gap_s=5.0))
     assert back[25, 3] == back[3, 25] == 1
     assert back[9, 0] == 0
     assert back[29, 20] == 0
@@ -127,7 +130,7 @@ def test_loop_needs_the_camera_to_have_looked_elsewhere():
 @settings(max_examples=40, deadline=None)
 def test_relation_is_symmetric_and_silent_within_the_gap(yaw, gap_s, rule):
     poses = path(yaw)
-    pairs = relation(poses, SIZE, LabelConfig(min_gap_s=gap_s, rule=rule))
+    pairs = relation_of(poses, SIZE, LabelConfig(min_gap_s=gap_s, rule=rule))
     assert np.array_equal(pairs, pairs.T)
     apart = np.abs(np.subtract.outer(poses.stamp_ns, poses.stamp_ns)) * 1e-9
     assert not pairs[apart < gap_s - 1e-6].any()
@@ -136,7 +139,7 @@ def test_relation_is_symmetric_and_silent_within_the_gap(yaw, gap_s, rule):
 
 def test_distance_rule_knows_distance_and_angle_only():
     config = LabelConfig(rule='distance', min_gap_s=1.0)
-    pairs = relation(path([0, 0, 0, 90, 0], x_m=[0, 1, 9, 0, 0.2]), SIZE, config)
+    pairs = relation_of(path([0, 0, 0, 90, 0], x_m=[0, 1, 9, 0, 0.2]), SIZE, config)
     assert pairs[4, 0] == 1
     assert pairs[2, 0] == -1
     assert pairs[3, 0] == -1
@@ -204,7 +207,7 @@ def test_contradicting_thresholds_are_refused():
 def test_pairs_are_balanced_distinct_and_spread_over_time():
     rng = np.random.default_rng(0)
     poses = path(np.r_[np.zeros(100), np.full(50, 180.0), np.zeros(100)], period_s=0.5)
-    pairs = relation(poses, SIZE, LabelConfig(rule='overlap'))
+    pairs = relation_of(poses, SIZE, LabelConfig(rule='overlap'))
     sample = sample_pairs(pairs, rng, 80)
     assert sample.is_loop.sum() == 80
     assert len(sample.query) == 160

@@ -324,3 +324,16 @@ def test_a_folder_of_recordings_names_them(tmp_path):
     assert '\n' not in str(error.value)
     with pytest.raises(SequenceError, match=r'name one of .*fr1'):
         open_sequence(tmp_path)
+
+
+def test_a_frame_of_replica_whose_pose_was_lost_has_none(tmp_path):
+    room = layouts.replica(tmp_path)
+    lines = (room / 'traj.txt').read_text().splitlines()
+    (room / 'traj.txt').write_text('\n'.join([lines[0], ' '.join(['nan'] * 16), *lines[2:]]))
+    found = open_sequence(room)
+    assert found.frame_count == layouts.COUNT
+    assert found.trajectory.stamp_ns.tolist() == [
+        stamp for number, stamp in enumerate(found.stamps_ns) if number != 1]
+    (room / 'traj.txt').write_text('\n'.join([' '.join(['nan'] * 16)] * layouts.COUNT))
+    with pytest.raises(SequenceError, match=r'traj\.txt: none of 4 poses is of finite numbers'):
+        open_sequence(room)

@@ -181,6 +181,20 @@ def test_reuse_between_queries_does_not_change_the_answer(model):
     assert detector.judge(flipped) == fresh.judge(flipped)
 
 
+def test_a_keyframe_is_prepared_once(model, monkeypatch):
+    monkeypatch.setattr('adversarial_lcd_ros.lcd.detector.CACHED_VIEWS', 1)
+    detector = LoopClosureDetector(LcdConfig(
+        model=model(), min_gap_s=1.0, defences='own_defences:CountsPreparations'))
+    defence, = detector.judging.scoring.defences
+    for second in range(6):
+        detector.detect(at(second, seed=second % 3))
+        assert defence.asked == second + 1
+    revisit = at(9, seed=1)
+    for graph in (revisit, revisit.flip([(2, 3)]), revisit.flip([(4, 9)])):
+        detector.judge(graph)
+    assert defence.asked == 6 + 3
+
+
 def map_of(model, target):
     """Return a function that makes detectors with the same keyframes: some alike, some not."""
     graph = suited(target, make_graph(

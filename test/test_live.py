@@ -102,7 +102,7 @@ def test_an_attacker_over_budget_fails_the_run():
 
 
 def test_the_recipe_that_ships_and_what_overrides_it():
-    attacks = load_recipe('quick', {'ratio': 1e-4})
+    attacks = load_recipe('quick', {'ratio': 1e-4}).attacks
     assert {attack.search for attack in attacks.values()} == {'recall', 'stepwise'}
     assert {attack.ratio for attack in attacks.values()} == {1e-4}
 
@@ -121,7 +121,7 @@ def test_the_recipe_that_ships_and_what_overrides_it():
         'replay, query-guided (in place of eigencentrality + SVM-RBF)']),
 ])
 def test_an_attack_is_called_what_it_is(overrides, names):
-    attacks = load_recipe('quick', overrides)
+    attacks = load_recipe('quick', overrides).attacks
     assert list(attacks) == names
     assert len(set(map(used_settings, attacks.values()))) == len(names)
 

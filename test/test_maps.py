@@ -224,8 +224,11 @@ def test_maps_are_made_once_reported_and_shown(folder, capsys):
     assert main(['report', str(folder)]) == 0
     page = (folder / 'report.html').read_text()
     assert 'What it does to the map' in page
-    assert page.count('Under forger') == 1
+    assert page.count('Under forger, with 3 false closures, the young map (29 frames)') == 1
     assert main(['report', str(folder / 'map')]) == 0
+    alone = (folder / 'map' / 'report.html').read_text()
+    assert alone.count('Under forger') == 1
+    assert '<th>' not in page + alone
     assert '| forger |' in (folder / 'map' / 'tables.md').read_text()
     capsys.readouterr()
     assert main(['inspect', str(folder / 'map')]) == 0

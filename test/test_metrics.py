@@ -12,10 +12,9 @@ from adversarial_lcd_ros.evaluation.metrics import (
     effect,
     first_closure_latency_s,
     measure,
-    outcomes,
     precision_recall,
-    right,
 )
+from adversarial_lcd_ros.evaluation.outcomes import outcomes, right
 
 FRAMES = st.lists(st.tuples(st.sampled_from([1, -1, 0]), st.integers(0, 10), st.booleans()),
                   min_size=0, max_size=60)

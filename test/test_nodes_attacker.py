@@ -66,7 +66,7 @@ def test_what_it_cannot_read_passes_byte_for_byte(ros, name):
 
 def test_attacked_graphs_keep_stamp_frame_and_sequence(ros, lcd_model):
     lcd = ros.start(LcdNode, model=lcd_model, min_gap_s=1)
-    line = Line(ros, listeners=2, ratio=3 / 40**2, queries_per_edit=10)
+    line = Line(ros, listeners=2, ratio=3 / 40**2, queries_per_edit=10, query_timeout_s=60)
     decisions = ros.collect('loop_closures',
                             lambda wire: codec.decode_loop_closure(unwrap(wire)))
     for index in range(6):
@@ -104,7 +104,7 @@ def test_answers_of_other_queries_and_damaged_answers_are_ignored(ros):
     answers.publish(b'junk')
     answers.publish(wrap(codec.encode_answer(
         codec.LcdAnswer(queries[0].id + 1, True, True, 0.9))))
-    ros.until(lambda: line.reports)
+    ros.until(lambda: line.reports and line.node.diagnostics['refused answer'])
     assert line.reports[0].reason == 'no answer'
     assert line.node.diagnostics['refused answer'] == 1
 
@@ -123,6 +123,7 @@ def test_a_backlog_is_forwarded_in_order_and_reported(ros):
     assert line.out == wires
     assert [r.reason for r in line.reports] == ['backlog'] * 5
     assert line.node.diagnostics['skipped for backlog'] == 5
+    ros.until(lambda: not line.node._catching_up)
     line.clean.publish(wires[0])
     ros.until(lambda: len(queries) == 2)  # caught up: attacked again
 
@@ -189,7 +190,7 @@ def test_the_same_seed_gives_the_same_bytes_over_ros(ros, lcd_model):
     from adversarial_lcd_ros.attack.attacker import Attacker
     from adversarial_lcd_ros.config import AttackConfig
     lcd = ros.start(LcdNode, model=lcd_model, min_gap_s=1)
-    line = Line(ros, listeners=2, ratio=0.002, queries_per_edit=8)
+    line = Line(ros, listeners=2, ratio=0.002, queries_per_edit=8, query_timeout_s=60)
     core = Attacker(AttackConfig(ratio=0.002, queries_per_edit=8))
     for index in range(0, 6, 2):
         clean = make_graph(40, EDGES, stamp_ns=index * SECOND, sequence=index, seed=index // 4)

@@ -7,6 +7,7 @@ from array import array
 from dataclasses import replace
 import struct
 from threading import Event
+import time
 import zlib
 
 from graph_factory import make_graph
@@ -59,6 +60,13 @@ def send(ros, topic, *wires, **qos):
     return publisher
 
 
+@pytest.fixture
+def one_status(monkeypatch):
+    """Let nodes tell their status when asked alone: another one would take the news away."""
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.diagnostics.PERIOD_S', 1e6)
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.diagnostics._LATE_S', 1e6)
+
+
 def status_of(ros, node):
     """Return the level, the line and the values of a node's next status."""
     found = ros.collect('/diagnostics', lambda message: message.status[0], DiagnosticArray,
@@ -85,7 +93,8 @@ def test_a_graph_of_heavy_words_ends_no_detector(ros, lcd, decisions):
 
 
 @pytest.mark.parametrize('error', [OverflowError('x'), MemoryError(), ValueError('y')])
-def test_a_defect_of_our_own_is_survived_and_counted(ros, lcd, decisions, monkeypatch, error):
+def test_a_defect_of_our_own_is_survived_and_counted(
+        ros, one_status, lcd, decisions, monkeypatch, error):
     def broken(*_):
         raise error
 
@@ -102,7 +111,7 @@ def test_a_defect_of_our_own_is_survived_and_counted(ros, lcd, decisions, monkey
     ros.until(lambda: decisions)
 
 
-def test_refusals_are_counted_by_cause_and_refusing_all_is_an_error(ros, lcd):
+def test_refusals_are_counted_by_cause_and_refusing_all_is_an_error(ros, one_status, lcd):
     send(ros, 'graph', b'junk', HEAVY, HEAVY,
          wrap(damaged(node_size=np.zeros(12, np.float32))))
     ros.until(lambda: lcd.diagnostics['refused graph'] == 4)
@@ -143,16 +152,20 @@ def test_graphs_are_decided_before_the_queries_that_wait(ros, lcd, decisions):
 
 def test_queries_have_a_rate(ros, lcd_model):
     lcd = ros.start(LcdNode, model=lcd_model, max_queries_per_s=1)
+    began_s = time.monotonic()
     send(ros, 'query', *(query_of(1, number) for number in range(20)))
     ros.until(lambda: lcd.diagnostics['received queries'] == 20)
-    assert lcd.diagnostics['refused query: rate'] >= 15
-    assert lcd.diagnostics['published answers'] >= 1
+    answered, refused = (lcd.diagnostics[name] for name in (
+        'published answers', 'refused query: rate'))
+    assert answered + refused == 20
+    assert 1 <= answered <= 2 + time.monotonic() - began_s
 
 
 @pytest.mark.parametrize(('indices', 'name'), [
     ([0, 1, 4], 'graphs: missing'), ([0, 1, 1], 'graphs: repeated'),
     ([3, 4, 2], 'graphs: out of order'), ([0, 1, 100_000], 'graphs: stamps that jumped')])
-def test_what_a_stream_gives_away_is_counted_and_said(ros, lcd, decisions, indices, name):
+def test_what_a_stream_gives_away_is_counted_and_said(
+        ros, one_status, lcd, decisions, indices, name):
     send(ros, 'graph', *map(wire_of, indices))
     ros.until(lambda: len(decisions) == 3)
     assert lcd.diagnostics[name] == {'graphs: missing': 2}.get(name, 1)
@@ -200,7 +213,8 @@ def test_a_restarted_detector_is_noticed_by_whoever_asks(ros):
     ros.until(lambda: node.diagnostics['restarts of lcd'] >= 1)
 
 
-def test_a_second_publisher_and_a_lost_one_show(ros, lcd, decisions):
+def test_a_second_publisher_and_a_lost_one_show(ros, one_status, lcd, decisions, monkeypatch):
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.endpoints._STALE_S', 1e6)
     first = send(ros, 'graph', wire_of(0))
     ros.until(lambda: decisions)
     assert status_of(ros, lcd)[0] == DiagnosticStatus.OK
@@ -309,19 +323,22 @@ def test_a_search_that_does_not_end_keeps_no_graph(ros, monkeypatch, mode):
 
 
 def test_the_best_so_far_goes_out_at_the_deadline(ros, monkeypatch):
-    node = ros.start(AttackerNode, ratio=0.01, deadline_ms=100.0)
+    node = ros.start(AttackerNode, ratio=0.01, deadline_ms=1e6)
     out = ros.collect('graph', lambda wire: codec.decode_graph(unwrap(wire)))
     reports = ros.collect('attack_report',
                           lambda wire: codec.decode_attack_report(unwrap(wire)))
-    release = Event()
+    found, release = Event(), Event()
 
     def hunt(hunting, rng):
         flipped = hunting.best.flip(hunting.best.edge[:2])
         hunting.keep(flipped, hunting.loss + 1, False)
+        found.set()
         release.wait(60)
         return 'too late'
 
     monkeypatch.setattr(node._attacker._search, 'hunt', hunt)
+    # The deadline comes as soon as there is something, however slow the machine is.
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.attacker.wait', lambda *_: found.wait(60))
     monkeypatch.setattr(node._oracle, 'ask', lambda _: codec.LcdAnswer(1, False, True, 0.25))
     try:
         send(ros, 'graph_clean', wire_of(0))
@@ -333,7 +350,7 @@ def test_the_best_so_far_goes_out_at_the_deadline(ros, monkeypatch):
     assert reports[0].loss_after == pytest.approx(reports[0].loss_before + 1)
 
 
-def test_a_frozen_detector_shows_under_a_deadline_too(ros):
+def test_a_frozen_detector_shows_under_a_deadline_too(ros, one_status):
     node = ros.start(AttackerNode, ratio=0.01, deadline_ms=20.0, max_backlog=100)
     ros.collect('query', bytes)  # hears, and says nothing
     reports = ros.collect('attack_report',
@@ -342,10 +359,14 @@ def test_a_frozen_detector_shows_under_a_deadline_too(ros):
     clean = ros.publisher('graph_clean')
     ros.matched(clean)
     ros.matched(node._oracle._queries)
-    for index in range(6):
-        clean.publish(wire_of(index))
-        ros.until(lambda count=index + 1: len(reports) == len(out) == count)
-    assert {report.reason for report in reports} == {'deadline', 'no answer'}
+    # On a busy machine the deadline may pass before the query goes out.
+    for count in range(1, 200):
+        clean.publish(wire_of(count))
+        ros.until(lambda count=count: len(reports) == len(out) == count)
+        if reports[-1].reason != 'deadline':
+            break
+    assert len(reports) >= 3
+    assert reports[-1].reason == 'no answer'
     assert node.diagnostics['queries without answer'] >= 1
     level, line, _ = status_of(ros, node)
     assert level == DiagnosticStatus.WARN

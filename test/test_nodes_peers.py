@@ -68,6 +68,38 @@ def test_a_node_that_gets_ready_is_waited_for_beyond_the_limit(
     assert ahead_s == 600.0
 
 
+@pytest.mark.parametrize('is_told', [True, False])
+def test_a_replay_waits_until_the_others_know_who_hears_them(
+        ros, bag, pipeline, monkeypatch, is_told):  # noqa: F811
+    """A listener that is not matched in twenty seconds never will be: its QoS does not fit."""
+    status, name = pipeline.lcd.diagnostics, 'listeners of /loop_closures'
+    known = status.gauges[name]
+    status.gauges[name] = lambda: 0
+    node = replay(ros, bag, lockstep=True)
+    ros.until(lambda: not node._missing())
+    real_s, ahead_s, turns, published = time.monotonic, 0.0, iter(range(10**6)), []
+
+    def spin(seconds):
+        nonlocal ahead_s
+        turn = next(turns)
+        if turn < 100:
+            status.publish()
+            ahead_s = 10.0 * (turn > 50)
+        elif turn == 100:
+            published.append(node._published)
+            if is_told:
+                status.gauges[name] = known
+                status.publish()
+            else:
+                ahead_s = 30.0
+        return ros.spin(min(seconds, 0.01))
+
+    monkeypatch.setattr('adversarial_lcd_ros.nodes.bag_replay.time',
+                        SimpleNamespace(monotonic=lambda: real_s() + ahead_s))
+    assert node.work(spin) == 0
+    assert published == [0]
+
+
 def test_a_second_detector_fails_a_recording_and_is_named(
         ros, bag, pipeline, lcd_model, tmp_path):  # noqa: F811
     ros.start(LcdNode, '__ns:=/other', 'loop_closures:=/loop_closures', model=lcd_model)

@@ -64,7 +64,7 @@ class Processes:
     def log(self, name):
         return (self._folder / f'{name}.log').read_text(encoding='utf-8')
 
-    def wait(self, name, timeout_s=60):
+    def wait(self, name, timeout_s=300):
         """Return the exit code."""
         return self._running[name].wait(timeout_s)
 
@@ -94,7 +94,7 @@ def await_node(monkeypatch, domain):
                signal_handler_options=SignalHandlerOptions.NO)
     observer = rclpy.create_node('observer', context=context, use_global_arguments=False)
 
-    def wait(name, deadline_s=120):
+    def wait(name, deadline_s=300):
         end_s = time.monotonic() + deadline_s
         while name not in observer.get_node_names():
             assert time.monotonic() < end_s, f'{name} did not start'
@@ -119,10 +119,13 @@ def test_a_pipeline_of_processes_loses_nothing_and_ends_with_exit_code_0(
         processes, tmp_path, vocabulary, lcd_model):
     if not TOUR.is_dir():
         pytest.skip(f'{TOUR} is not in this checkout')
+    # The others may take minutes to import where the machine is busy.
     processes.start('bag_replay', bag=TOUR, lockstep='true', record=tmp_path / 'record',
-                    duration_s=FRAMES * FRAME_S - FRAME_S / 2)
+                    duration_s=FRAMES * FRAME_S - FRAME_S / 2, start_timeout_s='0.0',
+                    timeout_s=120.0)
     processes.start('lcd', model=lcd_model, min_gap_s=1.0)
-    processes.start('attacker', ratio=0.0003, queries_per_edit=1, max_queries=5)
+    processes.start('attacker', ratio=0.0003, queries_per_edit=1, max_queries=5,
+                    query_timeout_s=60.0)
     processes.start('graph_builder', 'graph:=graph_clean', detector='none',
                     vocabulary=vocabulary)
     assert processes.wait('bag_replay') == 0, processes.log('bag_replay')
@@ -130,7 +133,7 @@ def test_a_pipeline_of_processes_loses_nothing_and_ends_with_exit_code_0(
     for name in ('graph_builder', 'attacker', 'lcd'):
         processes.interrupt(name)
     for name in ('graph_builder', 'attacker', 'lcd'):
-        assert processes.wait(name, 20) == 0, processes.log(name)
+        assert processes.wait(name) == 0, processes.log(name)
         assert 'Traceback' not in processes.log(name)
     readers = {'graph': codec.decode_graph, 'graph_clean': codec.decode_graph,
                'loop_closures': codec.decode_loop_closure,
@@ -154,5 +157,5 @@ def test_an_idle_node_ends_on_sigint_with_exit_code_0(
     await_node(name)
     processes.interrupt(name)
     processes.interrupt(name)
-    assert processes.wait(name, 20) == 0, processes.log(name)
+    assert processes.wait(name) == 0, processes.log(name)
     assert 'Traceback' not in processes.log(name)

@@ -169,9 +169,16 @@ def test_a_free_input_takes_the_size_that_the_metadata_name(onnx_model):
     free = yolo(raw_head([(8, 10, 8, 4, {1: 0.9})]), images='float[B,3,H,W]')
     np.testing.assert_allclose(found_by(onnx_model(free, imgsz='[32, 32]')).box,
                                [[40, 40, 80, 40]], atol=1e-3)
-    for metadata in ({}, {'imgsz': 'large'}, {'imgsz': '[0, 32]'}, {'imgsz': '32'}):
+    for metadata in ({}, {'imgsz': 'large'}, {'imgsz': '[0, 32]'}, {'imgsz': '32'},
+                     {'imgsz': '[true, true]'}, {'imgsz': '[8193, 32]'}):
         with pytest.raises(ModelError, match='export the model with a fixed size'):
             ObjectDetector(onnx_model(free, **metadata), 0.4, 1)
+
+
+def test_an_input_that_takes_all_memory_is_refused(onnx_model):
+    huge = yolo(raw_head([]), images='float[1,3,200000,200000]')
+    with pytest.raises(ModelError, match=r'height, width\) of at most 8192: export'):
+        ObjectDetector(onnx_model(huge), 0.4, 1)
 
 
 @pytest.mark.parametrize('graph', [

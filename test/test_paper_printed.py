@@ -3,26 +3,34 @@
 
 """The paper's printed statistics, from its printed cells."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.paper.printed import (
     BUDGET_TABLE,
     OURS,
     PERTURBATION_TABLE,
-    REPAIR,
     SURROGATE_TABLE,
     misprints,
 )
 from adversarial_lcd_ros.evaluation.paper.ranks import rank_methods
 
-# Table 3 with the cell that explains Table 4 (our inference).
-REPAIRED_TABLE = SURROGATE_TABLE.corrected(*REPAIR)
+
+def corrected(table, method, row, value):
+    """Return a table with another value in one cell, and the average that follows."""
+    cells = tuple(value if name == row else cell
+                  for name, cell in zip(table.rows, table.columns[method], strict=True))
+    return replace(table, columns={**table.columns, method: cells},
+                   averages={**table.averages, method: round(float(np.mean(cells)), 2)})
+
+
+# Table 3 with the one cell that, if printed wrongly, explains the lead in the text and the whole
+# of Table 4. Our inference: the paper does not say so.
+REPAIRED_TABLE = corrected(SURROGATE_TABLE, 'SVM-poly', 'garden', -19.89)
 
 
 @dataclass(frozen=True)
@@ -152,8 +160,3 @@ def test_tables_share_the_cells_they_should_share():
     for name, cells in BUDGET_TABLE.columns.items():
         assert cells[-1] == PERTURBATION_TABLE.columns[name][0]
     assert np.all(np.diff(list(BUDGET_TABLE.columns.values()), axis=1) < 0)
-
-
-def test_correction_of_a_cell_that_is_not_there():
-    with pytest.raises(EvaluationError, match='no cell'):
-        SURROGATE_TABLE.corrected('SVM-poly', 'attic', -1.0)

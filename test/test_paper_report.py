@@ -4,7 +4,6 @@
 """The report on the paper's experiments, over synthetic rows (no detector made them)."""
 
 import csv
-from html.parser import HTMLParser
 import json
 import random
 import re
@@ -12,6 +11,7 @@ import shutil
 import subprocess
 
 import numpy as np
+from page_links import Links
 from paper_factory import SEQUENCES, make_row, make_rows
 import pytest
 
@@ -29,22 +29,6 @@ from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells, summ
 from adversarial_lcd_ros.evaluation.pictures import Picture, write_pictures
 
 POWERS = {'svm_linear': 0.1, 'svm_poly': 0.2, 'naive_bayes': 0.3, 'svm_rbf': 0.5}
-
-
-class Links(HTMLParser):
-    """Collects whatever a page would load, and its text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.sources, self.text = [], ''
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.sources += [value for name, value in attributes
-                         if name in ('src', 'srcset', 'href', 'data')]
-
-    def handle_data(self, data):
-        self.text += ' ' + ' '.join(data.split())
 
 
 def surrogate_rows(powers=POWERS, sequences=SEQUENCES, **settings):

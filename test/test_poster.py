@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from adversarial_lcd_ros.attack.images.poster import (
+    Poster,
     frontal_corners,
     make_texture,
     paste,
@@ -110,6 +111,20 @@ def test_messages_of_the_spans_hold_what_is_pasted_and_others_stay(kind):
         assert (after != before) == seen
         np.testing.assert_array_equal(
             pixels_of(kind, after), posting.on_pixels(pixels_of(kind, before), stamp_ns))
+
+
+def test_two_sheets_cover_the_share_together_and_hang_apart():
+    one, two = (Posting(ReplayConfig(poster='cells', poster_share=0.1, poster_sheets=sheets,
+                                     poster_spans='0:9'), 0).on_pixels(
+        np.full((480, 640, 3), 128, np.uint8), SECOND) for sheets in (1, 2))
+    for pixels, pieces in ((one, 1), (two, 2)):
+        changed = (pixels != 128).any(axis=2).astype(np.uint8)
+        assert 0.07 < changed.mean() < 0.13
+        _, _, found, _ = cv2.connectedComponentsWithStats(cv2.morphologyEx(
+            changed, cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)))
+        assert (found[1:, cv2.CC_STAT_AREA] > 0.02 * changed.size).sum() == pieces
+    with pytest.raises(ConfigError, match=r'overlap: expected a share of at most 0\.25'):
+        Poster('cells', 0.26, 1, sheets=2)
 
 
 def test_without_a_poster_every_message_stays():

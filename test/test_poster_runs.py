@@ -20,7 +20,7 @@ from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.replay import run as live
 from adversarial_lcd_ros.evaluation.replay.findings import headline, meaning
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
-from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
+from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.run import evaluate_live
 from adversarial_lcd_ros.ground_truth.labelling import Views, label_views
@@ -41,8 +41,9 @@ def test_posters_of_the_recipe_that_ships_hang_in_places_that_certainly_differ()
     bag = share_path('bags/flat_tour')
     sequence = open_sequence(bag)
     time_s = (sequence.stamps_ns - sequence.stamps_ns[0]) / 1e9
-    posters = load_posters('posters')
-    assert list(posters) == list(load_recipe('posters', {}))
+    recipe = load_recipe('posters', {})
+    posters = recipe.posters
+    assert list(posters) == list(recipe.attacks)
     spans = {text: spans_in(text) for text in (
         settings['poster_spans'] for settings in posters.values())}
     hung = [[(start <= time_s) & (time_s < stop) for start, stop in each]
@@ -64,12 +65,13 @@ def test_posters_of_the_recipe_that_ships_hang_in_places_that_certainly_differ()
     ('{poster: cells}', 'hangs no poster'), ('{poster_spans: "1:2"}', 'hangs no poster'),
     ('{poster: cells, poster_spans: "2:1"}', 'FROM:TO'),
     ('{poster: cloth, poster_spans: "1:2"}', 'cloth'),
+    ('{poster: cells, poster_spans: "1:2", poster_sheets: 2, poster_share: 0.4}', 'overlap'),
     ('{poster_size: 3}', 'poster_size')])
 def test_wrong_posters_are_refused(tmp_path, replay, said):
     path = tmp_path / 'recipe.yaml'
     path.write_text(f'attacks: [{{name: a, mode: pass, replay: {replay}}}]')
     with pytest.raises(ConfigError, match=said):
-        load_posters(str(path))
+        load_recipe(str(path), {})
 
 
 @pytest.mark.parametrize(('attacks', 'posters', 'built'), [
@@ -101,7 +103,8 @@ def test_a_poster_hangs_in_its_run_alone(tmp_path, kept_runs):
     assert summary['graphs_rebuilt_differently'] == {'a': 0}
     assert json.loads((folder / 'configuration.json').read_text())['posters'] == {'p': HUNG}
     row = json.loads((folder / 'summary.json').read_text())['rows'][1]
-    assert row['poster'] == {'kind': 'cells', 'share': 0.3, 'spans': '6:8, 18:20'}
+    assert row['poster'] == {'kind': 'cells', 'share': 0.3, 'sheets': 1,
+                             'spans': '6:8, 18:20'}
 
 
 def test_what_a_poster_takes_is_not_told_as_an_attack_on_messages():

@@ -3,11 +3,11 @@
 
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from html.parser import HTMLParser
 import json
 
 from graph_factory import make_graph
 import numpy as np
+from page_links import Links
 import pytest
 
 from adversarial_lcd_ros.commands.common import print_lines
@@ -20,7 +20,6 @@ from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, CLEAN_COLOUR
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.replay import findings, report, tables
 from adversarial_lcd_ros.evaluation.replay.behind import ask_check
-from adversarial_lcd_ros.evaluation.replay.pictures import choose_records, describe
 from adversarial_lcd_ros.evaluation.replay.records import (
     AttackRun,
     make_records,
@@ -29,9 +28,10 @@ from adversarial_lcd_ros.evaluation.replay.records import (
     write_records,
 )
 from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, as_document, summarise
+from adversarial_lcd_ros.evaluation.replay.telling import choose_records, describe
 from adversarial_lcd_ros.evaluation.terminal import replay_lines
 from adversarial_lcd_ros.ground_truth.labels import label_frames, unlabelled
-from adversarial_lcd_ros.lcd.geometry import count_inliers
+from adversarial_lcd_ros.lcd.geometry import find_inliers
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.registry import PERTURBATIONS
 
@@ -201,22 +201,6 @@ def test_pictures_are_of_the_telling_frames(records):
     assert choose_records([], 6) == []
 
 
-class Links(HTMLParser):
-    """Collects whatever a page would load, and its text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.sources, self.text = [], ''
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.sources += [value for name, value in attributes
-                         if name in ('src', 'srcset', 'href', 'action', 'data')]
-
-    def handle_data(self, data):
-        self.text += data
-
-
 @pytest.fixture
 def folder(tmp_path, records, summary):
     made = results.ResultsFolder.create(tmp_path / 'results')
@@ -284,7 +268,8 @@ def test_headline_says_whose_the_attack_is_and_what_the_papers_took(summary):
     assert "The attack eigen, the paper's, took" in findings.headline(summary)
     unsure = {**ours, 'decline_ci95': (0.0, 30.0)}
     text = findings.headline({**summary, 'attacks': [eigen, unsure]})
-    assert "The strongest, recall, this project's own, changed it" in text
+    assert "recall, this project's own, took 20.0 points" in text
+    assert 'whether that is chance: 95\u202f% interval 0.0 to 30.0' in text
     assert "The paper's own (eigen) took" in text
 
 
@@ -330,8 +315,8 @@ def test_the_check_is_asked_of_the_graphs_that_the_detector_got(records):
         known = record.is_loop and record.match_frame is not None
         assert (record.support is not None) == known
         if known:
-            assert record.support == count_inliers(
-                graphs[record.frame], graphs[record.match_frame], 3.0) / 20
+            assert record.support == find_inliers(
+                graphs[record.frame], graphs[record.match_frame], 3.0).count / 20
     same = ask_check(records, sent, LcdConfig(geometric_check=True))
     assert all(record.support is None for record in same)
 

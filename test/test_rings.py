@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 from results_factory import ring_row
 
-from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
+from adversarial_lcd_ros.attack.searches import make_search
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import ConfigError, EvaluationError
 from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
 from adversarial_lcd_ros.evaluation.kinds import open_results
 from adversarial_lcd_ros.evaluation.recipes import read_recipe
-from adversarial_lcd_ros.evaluation.rings import plots, report
+from adversarial_lcd_ros.evaluation.rings import plots
+from adversarial_lcd_ros.evaluation.rings import run as rings_run
 from adversarial_lcd_ros.evaluation.rings.html import headline, rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.posters import (
@@ -40,9 +42,11 @@ from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, SAME, Condit
 from adversarial_lcd_ros.evaluation.rings.summaries import (
     ANY,
     FLIPS,
+    NODES,
     WITHIN_NODES,
     WITHIN_R,
     defence_title,
+    ring_of,
     summarise,
     worst_cases,
 )
@@ -52,6 +56,7 @@ from adversarial_lcd_ros.evaluation.streams import GraphSource, graphs_digest
 from adversarial_lcd_ros.graph_sequences.opening import open_graphs
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.paths import share_path
+from adversarial_lcd_ros.registry import SEARCHES
 from adversarial_lcd_ros.vision.builder import GraphBuilder
 
 CAMERA = Camera(np.eye(3), np.zeros(3), 0.785, 640, 480)
@@ -245,7 +250,10 @@ def test_targets_are_kept_apart_and_refusals_shown(tmp_path):
     assert ', or refused 100 %' in report
     assert [rank.defence for rank in ranking(summary) if rank.target == 'wl'] == [
         'sealed graphs', 'rederive', 'none']
-    assert '100.0 % are left, refusals, with an alarm each, counted as attacks that' in report
+    assert 'Sealed graphs refuse what was changed, with an alarm each: counting that as ' in report
+    assert 'failed attack, 100.0 % are left.' in report
+    assert '<small>100.0 % or refused</small>' in report
+    assert 'tour, wl: 3 frames with a loop, 3 at a new place' in report
     assert 'Sealed graphs: builder and detector share a key.' in report
     # A folder from before there were seals and counts.
     old = tmp_path / 'old'
@@ -279,8 +287,24 @@ def test_the_same_nodes_close_and_far_apart_are_two_curves():
     for row, budget in zip(rows, (40, 80, 40, 80), strict=True):
         row['node_budget_mean'] = budget
     lines = plots._over(rows, 'nodes', 'move_nodes')
-    assert lines == {('tour', 'close: none'): {40: 50.0, 80: 50.0},
-                     ('tour', 'spread: none'): {40: 50.0, 80: 50.0}}
+    assert {title: {at: point.value for at, point in line.items()}
+            for title, line in lines.items()} == {
+        ('tour', 'close: none'): {40: 50.0, 80: 50.0},
+        ('tour', 'spread: none'): {40: 50.0, 80: 50.0}}
+
+
+def test_points_of_curves_have_intervals():
+    row = summarise([ring_row('', 'recall', 'recall', [LOST, LEFT])], 1)[0]
+    line, = plots._over([{**row, 'ci95': [20.0, 70.0]}, {**row, 'ratio': 9.0, 'ci95': None}],
+                        'ratio', plots.FLIPS).values()
+    assert line == {row['ratio']: (50.0, 20.0, 70.0), 9.0: (50.0, 50.0, 50.0)}
+    posters = [{'sequence': 'tour', 'control': plots.SAME, 'count': 1, 'kind': 'cells',
+                'target': 'wl', 'check': 'none', 'share': share, 'to_poster': fooled, 'pairs': 12}
+               for share, fooled in ((.1, 0), (.2, 12))]
+    line, = plots._posters(posters).values()
+    # Wilson's interval of 0 of 12 ends at z^2 / (n + z^2).
+    assert line[.1] == pytest.approx((0.0, 0.0, 3.8415 / 15.8415), abs=1e-4)
+    assert line[.2] == pytest.approx((1.0, 1 - 3.8415 / 15.8415, 1.0), abs=1e-4)
 
 
 def test_a_seal_has_a_price():
@@ -336,10 +360,18 @@ def test_the_recipe_has_every_defence_beside_one_who_knows_it():
     assert {condition.count for condition in conditions_of(config)} == {0, 1, 2}
 
 
+@pytest.mark.parametrize('name', list(SEARCHES))
+def test_an_attack_counts_by_what_its_search_changes(name):
+    search = make_search(AttackConfig(search=name))
+    graph = make_graph(60, [(0, 1)])
+    search.observe(graph)
+    assert (search.budget(graph).nodes > 0) == (ring_of({'search': name}) == NODES)
+
+
 def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
     stream = SimpleNamespace(name='tour', digest='a')
     tasks = [SimpleNamespace(sequence='tour', later=later) for later in (5, 3)]
-    monkeypatch.setattr(report, 'poster_tasks', lambda *_: tasks)
+    monkeypatch.setattr(rings_run, 'poster_tasks', lambda *_: tasks)
     asked = []
 
     def run(function, some):
@@ -348,14 +380,16 @@ def test_posters_that_hang_already_are_not_hung_again(tmp_path, monkeypatch):
             yield [{'sequence': task.sequence, 'later': task.later}]
 
     def rows_of(stream):
-        return report.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
-                                  LabelConfig(), run, lambda done, total: None)
+        rows, hung = rings_run.run_posters(tmp_path, [stream], PosterConfig(), (), LcdConfig(),
+                                           LabelConfig(), run, lambda done, total: None)
+        assert hung == tasks
+        return rows
 
     first = rows_of(stream)
     assert [row['later'] for row in first] == [3, 5]
     assert rows_of(stream) == first
     assert asked == [5, 3]
-    (tmp_path / report.POSTERS).write_text('{"rows": 7}')
+    (tmp_path / rings_run.POSTERS).write_text('{"rows": 7}')
     rows_of(stream)
     rows_of(SimpleNamespace(name='tour', digest='b'))
     assert asked == [5, 3] * 3

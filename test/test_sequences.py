@@ -3,6 +3,8 @@
 
 """Sequences from folders: what is read, and what is refused with a reason."""
 
+import os
+
 import bag_factory as make
 import cv2
 from hypothesis import given, settings
@@ -12,6 +14,7 @@ import pytest
 
 from adversarial_lcd_ros.errors import SequenceError
 from adversarial_lcd_ros.sequences import PLACE_INDEX, Frame, open_sequence
+from adversarial_lcd_ros.sequences.sequence import Coverage
 
 
 @pytest.fixture
@@ -259,3 +262,41 @@ def test_real_sequences(shared_data, name, frames, size, poses):
     assert {frame.image().shape for frame in sequence.frames(stride=frames // 4)} == {
         (size[1], size[0], 3)}
     assert sequence.trajectory.is_near(sequence.stamps_ns).mean() > 0.9
+
+
+def test_names_in_a_list_may_hold_blanks(tum):
+    for path in (tum / 'rgb').iterdir():
+        path.rename(path.with_name(f'my # picture {path.name}'))
+    rows = (tum / 'rgb.txt').read_text().replace(' rgb/', ' \t rgb/my picture ')
+    (tum / 'rgb.txt').write_text(rows)
+    with pytest.raises(SequenceError, match=r'line 3: there is no image .*/my picture 13'):
+        open_sequence(tum)
+    for path in (tum / 'rgb').iterdir():
+        path.rename(path.with_name(path.name.replace('# ', '')))
+    assert open_sequence(tum).frame_count == 4
+
+
+def test_pictures_of_other_kinds_are_named(tmp_path):
+    """Nobody shall believe that they were taken."""
+    folder = images(tmp_path / 'pictures')
+    for name in ('Image3.tif', 'Image4.TIF', 'Image5.bmp', '._Image6.bmp', 'archive.zip'):
+        (folder / name).write_bytes(b'')
+    sequence = open_sequence(folder)
+    assert sequence.frame_count == 3
+    assert sequence.notes == (f'{folder}: 1 .bmp, 2 .tif are not taken: convert them to PNG',)
+    for path in folder.glob('*.png'):
+        path.unlink()
+    with pytest.raises(SequenceError, match=r'no sequence but 1 \.bmp, 2 \.tif, 1 \.zip \(conv'):
+        open_sequence(folder)
+
+
+def test_a_pipe_among_pictures_is_refused_at_once(tmp_path):
+    folder = images(tmp_path / 'pictures')
+    os.mkfifo(folder / 'Image9.png')
+    with pytest.raises(SequenceError, match=r'Image9\.png is no regular file'):
+        list(open_sequence(folder).frames())
+
+
+def test_names_from_an_input_do_not_move_the_terminal():
+    assert str(Coverage(3, 0, 0.0, 0.0, 'frame \x1b[2J of\n1')) == (
+        'no ground truth: frame \\x1b[2J of\\n1')

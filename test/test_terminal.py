@@ -4,17 +4,21 @@
 """What is printed reaches terminals of any encoding and width, and names stay as they are."""
 
 import io
+import os
+from pathlib import Path
+import subprocess
 import sys
 
+import bag_factory as make
 from graph_factory import make_graph
 import numpy as np
 import pytest
 
 from adversarial_lcd_ros.cli import main
-from adversarial_lcd_ros.commands.common import make_console, progress_bar
-from adversarial_lcd_ros.evaluation.replay.tables import _table
+from adversarial_lcd_ros.commands.common import print_rows, progress_bar
 from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE
+from adversarial_lcd_ros.sequences import import_sequence
 from adversarial_lcd_ros.sequences.bagfile import BagWriter
 
 # Markup of rich that is opened, closed without being open, or a style that there is not.
@@ -78,8 +82,8 @@ def test_a_bag_is_shown_on_any_terminal(terminal, bag, encoding, width):
 def test_tables_of_an_evaluation_are_shown_on_any_terminal(terminal, tmp_path, encoding):
     opened = terminal(encoding)
     main(['inspect', str(tmp_path / 'none')])  # what every command does with its streams
-    make_console().print(_table('The detector on [/bold]', [
-        {'run': name, 'balanced': '75.0\u202f% → 50.0\u202f%'} for name in NAMES]))
+    print_rows('The detector on [/bold]', [
+        {'run': name, 'balanced': '75.0\u202f% → 50.0\u202f%'} for name in NAMES])
     text = opened.text()
     assert 'The detector on [/bold]' in text
     assert all(f' {name} ' in text for name in NAMES)
@@ -102,3 +106,30 @@ def test_an_error_with_any_name_is_one_line(terminal, tmp_path):
     assert text.startswith('error: ')
     assert text.count('\n') == 1
     assert r'n?[/b]\udcff' in text  # what cannot be printed is spelt out
+
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.mark.parametrize(('redirection', 'said', 'code'), [
+    ('>&-', 'error: there is no bag nowhere', 2), ('2>&-', '', 2), ('>&- 2>&- <&-', '', 2),
+    ('2>/dev/full', '', 2)])
+def test_a_stream_that_is_closed_or_full_changes_no_exit_code(tmp_path, redirection, said, code):
+    """The number of a closed stream would be that of the next file, which gets what is said."""
+    done = subprocess.run(
+        ['bash', '-c', f'"{sys.executable}" -m adversarial_lcd_ros.cli inspect nowhere '
+         f'{redirection}'], cwd=tmp_path, capture_output=True, text=True, check=False,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)}, timeout=300)
+    assert (done.stderr.strip(), done.stdout, done.returncode) == (said, '', code)
+
+
+def test_what_a_command_says_to_nobody_spoils_no_file(tmp_path):
+    make.tum_folder(tmp_path / 'source')
+    whole = import_sequence(tmp_path / 'source', tmp_path / 'a' / 'bag').path
+    done = subprocess.run(
+        ['bash', '-c', f'"{sys.executable}" -m adversarial_lcd_ros.cli import source b/bag '
+         '>&- 2>&- <&-'], cwd=tmp_path, check=False, env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        timeout=300)
+    assert done.returncode == 0
+    for file in whole.iterdir():
+        assert file.read_bytes() == (tmp_path / 'b' / 'bag' / file.name).read_bytes()

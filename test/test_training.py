@@ -26,14 +26,15 @@ from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.paths import model_path
 from adversarial_lcd_ros.sequences.part import SequencePart
 from adversarial_lcd_ros.training import run as training_run
-from adversarial_lcd_ros.training.run import TrainingPlan, train
+from adversarial_lcd_ros.training.plan import TRAINING_LABELS, TrainingPlan
+from adversarial_lcd_ros.training.run import train
 from adversarial_lcd_ros.training.sources import one_licence_each
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary
 
 LAP, PERIOD_NS = 20, 500_000_000
 PLAN = TrainingPlan(BuilderConfig(detector='none', features=60, detected_features=200),
                     # The places are textures, and no surface that an audit could find.
-                    labels=replace(training_run.TRAINING_LABELS, rule='overlap'),
+                    labels=replace(TRAINING_LABELS, rule='overlap'),
                     targets=('wl', 'vbow', 'symbio'), pairs=40, branching=4, depth=2,
                     flips_per_frame=2)
 

@@ -128,11 +128,15 @@ class Search(Shown, ABC):
     query_share : float
         About which share of its queries it spends one by one. It only tells how long an
         evaluation may take.
+    changes_nodes : bool
+        It changes nodes, within a ``budget`` of them; else edges alone. The leaderboard of the
+        defences counts the two apart.
 
     """
 
     own_settings: ClassVar[tuple[str, ...]] = ()
     query_share: ClassVar[float] = 1.0
+    changes_nodes: ClassVar[bool] = False
 
     def __init__(self, config: AttackConfig) -> None:
         self.config = config

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from adversarial_lcd_ros.commands.common import (
     Commands,
+    add_cache_option,
     add_command,
     add_source_options,
     imported_source,
@@ -17,7 +18,12 @@ from adversarial_lcd_ros.commands.common import (
     tell,
 )
 from adversarial_lcd_ros.config import BuilderConfig
-from adversarial_lcd_ros.settings import add_config_options, add_models_option, config_from_options
+from adversarial_lcd_ros.settings import (
+    add_config_option,
+    add_config_options,
+    add_models_option,
+    config_from_options,
+)
 
 
 def add(commands: Commands) -> None:
@@ -30,12 +36,9 @@ def add(commands: Commands) -> None:
                         'PATH@FROM:TO takes a part of its frames, PATH@0:0.5 the first half')
     parser.add_argument('destination', type=Path, metavar='DESTINATION',
                         help='bag to write (rosbag2, MCAP)')
-    parser.add_argument('--cache', type=Path, metavar='FOLDER',
-                        help='where built graphs are kept (default: in the cache of the user)')
+    add_cache_option(parser)
     parser.add_argument('--overwrite', action='store_true', help='replace a bag that is there')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML) of graph_builder; options of the command line win '
-                        'over it')
+    add_config_option(parser, 'graph_builder')
     add_source_options(parser)
     add_models_option(parser)
     # argparse's own usage would be twenty options long before the first explanation.

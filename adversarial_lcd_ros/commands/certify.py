@@ -144,8 +144,8 @@ def _streams(options: Namespace) -> list[Stream]:
     with progress_bar('graphs') as progress:
         for variant in dict.fromkeys(map(needed_variant, options.targets)):
             streams += open_streams(
-                options.sources, [builder.features], builder, labels, options.cache,
-                lambda _, done, total: progress(done, total), variant=variant)
+                options.sources, [builder.features], builder, labels, options.cache, progress,
+                variant=variant)
     return streams
 
 

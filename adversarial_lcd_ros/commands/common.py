@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace, _SubParsersAction
+from argparse import ArgumentParser, Namespace, _ActionsContainer, _SubParsersAction
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import os
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from adversarial_lcd_ros.commands.examples import shown
 from adversarial_lcd_ros.errors import ConfigError
+from adversarial_lcd_ros.settings import add_config_option
 from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ def be_quiet(quiet: bool) -> None:
         os.environ[QUIET] = '1'
     else:
         os.environ.pop(QUIET, None)
+
+
+def is_quiet() -> bool:
+    """Tell whether only results, warnings and errors are to be shown."""
+    return QUIET in os.environ
 
 
 def add_json_option(parser: ArgumentParser) -> None:
@@ -115,12 +121,21 @@ def make_console(*, stderr: bool = False) -> Console:
 
 def add_work_options(parser: ArgumentParser) -> None:
     """Add how many processes work, where built graphs are kept, and a file of settings."""
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+    parser.add_argument('--jobs', type=int, default=worker_count(None), metavar='N',
                         help='processes (default: one for each core)')
+    add_cache_option(parser)
+    add_config_option(parser)
+
+
+def add_cache_option(parser: _ActionsContainer) -> None:
+    """Declare ``--cache``; also in a group of a parser."""
     parser.add_argument('--cache', type=Path, metavar='FOLDER',
                         help='where built graphs are kept (default: in the cache of the user)')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+
+
+def worker_count(jobs: int | None) -> int:
+    """Return how many processes work: those that were asked for, else one for each core."""
+    return jobs or os.cpu_count() or 1
 
 
 def check_counts(options: Namespace, *names: str) -> None:
@@ -185,7 +200,6 @@ def imported_source(source: str, options: Namespace, *, replayed: bool = False) 
         The nodes are to replay it: it must be a bag as "import" writes it.
 
     """
-    from adversarial_lcd_ros.errors import ConfigError
     from adversarial_lcd_ros.sequences.on_the_way import imported
     from adversarial_lcd_ros.sequences.part import SequencePart
 
@@ -204,7 +218,7 @@ def imported_source(source: str, options: Namespace, *, replayed: bool = False) 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar on stderr; yield what is to be called with the work done and the whole."""
-    if QUIET in os.environ:
+    if is_quiet():
         yield lambda done, total: None
         return
     from rich.progress import (
@@ -230,5 +244,5 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
 
 def tell(text: str) -> None:
     """Print a line on stderr; with --quiet only a warning."""
-    if QUIET not in os.environ or text.startswith('warning'):
+    if not is_quiet() or text.startswith('warning'):
         print(text, file=sys.stderr, flush=True)

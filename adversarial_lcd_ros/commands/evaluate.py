@@ -21,6 +21,7 @@ from adversarial_lcd_ros.commands.common import (
     make_console,
     print_json,
     print_lines,
+    print_rows,
     source_options,
     tell,
 )
@@ -34,6 +35,7 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import (
+    add_config_option,
     add_config_options,
     add_models_option,
     chosen_settings,
@@ -101,8 +103,7 @@ def _add_evaluation_options(parser: ArgumentParser, usage: str) -> None:
                         '(also label_sweep.csv)')
     parser.add_argument('--map', action='store_true',
                         help='make maps of the closures, too, as "map" does')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+    add_config_option(parser)
     add_json_option(parser)
     add_models_option(parser)
     for config_class, prefix in EVALUATED:
@@ -160,17 +161,17 @@ def _plan(options: Namespace) -> Plan:
         maps.check(options)
 
     from adversarial_lcd_ros.evaluation.replay.plan import Plan
-    from adversarial_lcd_ros.evaluation.replay.recipe import load_posters, load_recipe
+    from adversarial_lcd_ros.evaluation.replay.recipe import load_recipe
     from adversarial_lcd_ros.lcd.targets import builder_for
 
-    attacks = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
+    recipe = load_recipe(options.recipe, chosen_settings(options, AttackConfig))
     lcd = config_from_options(options, LcdConfig)
     return Plan(builder_for(config_from_options(options, BuilderConfig), lcd.target), lcd,
                 config_from_options(options, LabelConfig),
                 replace(ReplayConfig(window=LIVE_WINDOW, timeout_s=LIVE_TIMEOUT_S),
                         **chosen_settings(options, ReplayConfig)),
-                attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels,
-                posters=load_posters(options.recipe))
+                recipe.attacks, rebuild=options.rebuild, sweep_labels=options.sweep_labels,
+                posters=recipe.posters)
 
 
 def _evaluate_bag(bag: Path, plan: Plan, options: Namespace) -> None:
@@ -187,7 +188,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     """Print the tables and the main finding of an evaluation."""
     from adversarial_lcd_ros.evaluation.replay.findings import headline, is_labelled
     from adversarial_lcd_ros.evaluation.replay.summary import as_document
-    from adversarial_lcd_ros.evaluation.replay.tables import sweep_table
+    from adversarial_lcd_ros.evaluation.replay.tables import sweep_rows
     from adversarial_lcd_ros.evaluation.terminal import replay_lines
 
     made = maps.make([folder], options) if options.map else None
@@ -198,7 +199,7 @@ def _show(folder: Path, summary: dict[str, Any], options: Namespace) -> None:
     console = make_console()
     print_lines(*replay_lines(summary))
     if 'label_sweep' in summary:
-        console.print(sweep_table(summary))
+        print_rows('The same decisions by other labels', sweep_rows(summary))
     if made is not None:
         maps.show_runs(made)
     console.print(headline(summary))

@@ -9,19 +9,21 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
-import os
 from pathlib import Path
 import sys
 import time
 from typing import TYPE_CHECKING, Any
 
 from adversarial_lcd_ros.commands.common import (
+    add_cache_option,
     check_counts,
+    is_quiet,
     make_console,
     print_json,
     print_lines,
     progress_bar,
     tell,
+    worker_count,
 )
 from adversarial_lcd_ros.config import (
     AttackConfig,
@@ -32,11 +34,11 @@ from adversarial_lcd_ros.config import (
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.settings import chosen_settings, config_from_options
-from adversarial_lcd_ros.start import QUIET
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.frames.cells import Cell
     from adversarial_lcd_ros.evaluation.frames.run import Experiment
+    from adversarial_lcd_ros.evaluation.rings.posters import Checks, PosterConfig
     from adversarial_lcd_ros.evaluation.store import Row
     from adversarial_lcd_ros.evaluation.streams import Stream
     from adversarial_lcd_ros.evaluation.workers import Run
@@ -59,8 +61,7 @@ def add_options(parser: ArgumentParser) -> None:
     group.add_argument('--only', action='append', metavar='PART',
                        help='a part of the recipe, alone or with others named the same way; what '
                        'is finished is not run again (default: all)')
-    group.add_argument('--cache', type=Path, metavar='FOLDER',
-                       help='where built graphs are kept (default: in the cache of the user)')
+    add_cache_option(group)
 
 
 def refuse_options(options: Namespace) -> None:
@@ -68,16 +69,16 @@ def refuse_options(options: Namespace) -> None:
     given = [f'--{name}' for name in _OPTIONS if getattr(options, name) is not None]
     if given:
         raise ConfigError(f'{", ".join(given)} belong to recipes of the protocol "frames"; '
-                          f'{options.recipe} replays a bag through the nodes')
+                          f'{options.recipe or "this"} replays a bag through the nodes')
 
 
 def run(options: Namespace) -> None:
     """Run the recipe, or what is left of it, and write the report."""
     from adversarial_lcd_ros.evaluation.frames.recipe import load_cells
     from adversarial_lcd_ros.evaluation.frames.run import plan_experiment, run_experiment
-    from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.recipes import RINGS, read_recipe
     from adversarial_lcd_ros.evaluation.results import SUMMARY, read_json
+    from adversarial_lcd_ros.evaluation.rings.posters import poster_config
     from adversarial_lcd_ros.evaluation.store import open_store
 
     started = time.monotonic()
@@ -86,6 +87,10 @@ def run(options: Namespace) -> None:
     conditions = _conditions(options, lcd)
     cells = [replace(cell, conditions=conditions)
              for cell in load_cells(options.recipe, _overrides(options), options.only or ())]
+    path, recipe = read_recipe(options.recipe)
+    # Wrong ones are told before the hours that cells may take.
+    posters = (None if recipe.get('posters') is None else
+               poster_config(recipe['posters'], path))
     folder = _folder(options)
     with open_store(folder) as store:
         streams = _open(options, cells)
@@ -99,59 +104,46 @@ def run(options: Namespace) -> None:
             tell(f'{len(store.rows)} cells are in {store.path}; the same command goes on from '
                  'there')
             raise
-        path, recipe = read_recipe(options.recipe)
-        if recipe['protocol'] == RINGS:
-            report = _rings(options, folder, streams, cells, rows, (path, recipe.get('posters')))
-        else:
-            _draw(folder, streams, cells, rows, lcd)
-            report = write_paper_report(folder, rows)
+        report = (_report_rings(options, folder, streams, cells, rows, posters)
+                  if recipe['protocol'] == RINGS else
+                  _report_frames(folder, streams, cells, rows, lcd))
     if options.json:
         print_json({'folder': str(folder), **read_json(folder / SUMMARY)})
         return
     _conclude(rows, time.monotonic() - started, report)
 
 
-def _draw(folder: Path, streams: list[Stream], cells: list[Cell], rows: list[Row],
-          lcd: LcdConfig) -> None:
-    """Leave pictures of attacked frames in the folder, and of why attacks work where they do."""
+def _report_frames(folder: Path, streams: list[Stream], cells: list[Cell], rows: list[Row],
+                   lcd: LcdConfig) -> Path:
+    """Draw attacked frames, and why attacks work where they do; write the report."""
     from adversarial_lcd_ros.evaluation.frames.pictures import attacked_pictures
     from adversarial_lcd_ros.evaluation.frames.why import explain
     from adversarial_lcd_ros.evaluation.frames.why_picture import write_why
+    from adversarial_lcd_ros.evaluation.paper.report import write_paper_report
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
 
     write_pictures(folder, attacked_pictures(streams, cells, rows, lcd))
     write_why(folder, explain(streams, cells, rows, lcd))
+    return write_paper_report(folder, rows)
 
 
-def _rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
-           rows: list[Row], posters: tuple[Path, Any]) -> Path:
+def _report_rings(options: Namespace, folder: Path, streams: list[Stream], cells: list[Cell],
+                  rows: list[Row], posters: tuple[PosterConfig, Checks] | None) -> Path:
     """Hang the posters of a recipe, measure what defences cost, write the page."""
     from adversarial_lcd_ros.evaluation.pictures import write_pictures
     from adversarial_lcd_ros.evaluation.rings.pictures import ring_pictures
-    from adversarial_lcd_ros.evaluation.rings.posters import (
-        PairTask,
-        poster_config,
-        poster_streams,
-        poster_tasks,
-    )
-    from adversarial_lcd_ros.evaluation.rings.report import (
-        measured_prices,
-        run_posters,
-        write_rings,
-    )
+    from adversarial_lcd_ros.evaluation.rings.posters import PairTask, poster_streams
+    from adversarial_lcd_ros.evaluation.rings.report import write_rings
+    from adversarial_lcd_ros.evaluation.rings.run import measured_prices, run_posters
 
     lcd = config_from_options(options, LcdConfig)
     labels = config_from_options(options, LabelConfig)
     declared: list[Row] = []
     tasks: list[PairTask] = []
-    if posters[1] is not None:
-        config, checks = poster_config(posters[1], posters[0])
-        hung = poster_streams(streams)
+    if posters is not None:
         with _workers(options) as workers, progress_bar('posters') as progress:
-            declared = run_posters(folder, hung, config, checks, lcd, labels, workers,
-                                   progress)
-        tasks = [task for stream in hung
-                 for task in poster_tasks(stream, config, lcd, checks, labels)]
+            declared, tasks = run_posters(folder, poster_streams(streams), *posters, lcd, labels,
+                                          workers, progress)
     write_pictures(folder, ring_pictures(streams, cells, rows, lcd, declared, tasks))
     return write_rings(folder, rows, declared, measured_prices(streams, cells, lcd))
 
@@ -206,14 +198,14 @@ def _open(options: Namespace, cells: list[Cell]) -> list[Stream]:
 
     builder = config_from_options(options, BuilderConfig)
     labels = config_from_options(options, LabelConfig)
+    own_labels = load_labels(options.recipe, chosen_settings(options, LabelConfig))
     streams: list[Stream] = []
     with progress_bar('graphs') as progress:
         for variant in dict.fromkeys(cell.variant_needed for cell in cells):
             nodes = sorted({cell.nodes for cell in cells if cell.variant_needed == variant})
             streams += open_streams(
-                options.sources, nodes, builder, labels, options.cache,
-                lambda source, done, total: progress(done, total),
-                load_labels(options.recipe, chosen_settings(options, LabelConfig)), variant)
+                options.sources, nodes, builder, labels, options.cache, progress, own_labels,
+                variant)
     return streams
 
 
@@ -245,17 +237,11 @@ def _announce(options: Namespace, streams: list[Stream], experiment: Experiment,
         tell('cells finished earlier that are of other settings, graphs, models or code: '
              f'{others}; kept, but not in the report')
     left = len(experiment.keys) - experiment.finished
-    minutes = experiment.cost_s / 60
+    minutes, jobs = experiment.cost_s / 60, worker_count(options.jobs)
     where = (f'the workers of {options.scheduler}: {minutes:.0f} min of one core'
-             if options.scheduler else
-             f'{_jobs(options)} processes: about {minutes / _jobs(options):.0f} min')
+             if options.scheduler else f'{jobs} processes: about {minutes / jobs:.0f} min')
     tell(f'{left} of {len(experiment.keys)} cells to run on {where}' if left else
          f'all {len(experiment.keys)} cells are finished')
-
-
-def _jobs(options: Namespace) -> int:
-    jobs: int | None = options.jobs
-    return jobs or os.cpu_count() or 1
 
 
 def _workers(options: Namespace) -> AbstractContextManager[Run]:
@@ -263,13 +249,13 @@ def _workers(options: Namespace) -> AbstractContextManager[Run]:
 
     if options.scheduler:
         return dask_workers(options.scheduler)
-    return local_workers(_jobs(options))
+    return local_workers(worker_count(options.jobs))
 
 
 @contextmanager
 def _bar(experiment: Experiment) -> Iterator[Callable[[float, float], None]]:
     """Show cells and time left; the time by the expected costs, the cells as they are counted."""
-    if QUIET in os.environ:
+    if is_quiet():
         yield lambda cells, share: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -295,7 +281,7 @@ def _conclude(rows: list[Row], spent_s: float, report: Path) -> None:
     for title, lines in tables:
         print_lines(title, lines)
     console.print(finding)
-    if QUIET not in os.environ:
+    if not is_quiet():
         print_lines('Processor time a frame, ms', [
             {'attack': kind, 'frames': str(frames), 'queries': f'{1e3 * queries:.1f}',
              'search': f'{1e3 * search:.1f}', 'judging': f'{1e3 * judging:.1f}'}

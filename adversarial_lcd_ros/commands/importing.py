@@ -31,6 +31,7 @@ def add(commands: Commands) -> None:
 
 
 def _import(options: Namespace) -> None:
+    from adversarial_lcd_ros.files.text import printable
     from adversarial_lcd_ros.sequences import import_sequence
 
     with progress_bar(f'importing {options.source.name}') as progress:
@@ -38,8 +39,8 @@ def _import(options: Namespace) -> None:
             options.source, options.destination, progress=progress, overwrite=options.overwrite,
             raw_as=options.raw_as, **source_options(options))
     for note in done.notes:
-        print(note)
+        print(printable(note))
     width, height = done.image_size
-    print(f'{done.path}: {done.frames} frames of {width} x {height} pixels, {done.poses} poses, '
-          f'{done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
+    print(f'{printable(str(done.path))}: {done.frames} frames of {width} x {height} pixels, '
+          f'{done.poses} poses, {done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
     print(done.coverage)

@@ -21,6 +21,7 @@ from adversarial_lcd_ros.commands.common import (
     print_rows,
     source_options,
 )
+from adversarial_lcd_ros.errors import CodecError, SequenceError
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.sequences.inspection import BagSummary
@@ -68,7 +69,6 @@ def _show_results(folder: Path, *, as_json: bool) -> None:
 
 
 def _show_bag(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
-    from adversarial_lcd_ros.errors import SequenceError
     from adversarial_lcd_ros.sequences.inspection import inspect_bag, inspect_sequence
 
     bag, frames = inspect_bag(path), {}
@@ -86,7 +86,6 @@ def _show_bag(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
 
 
 def _show_file(path: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
-    from adversarial_lcd_ros.errors import CodecError, SequenceError
     from adversarial_lcd_ros.sequences.inspection import inspect_payload, payload_values
 
     try:

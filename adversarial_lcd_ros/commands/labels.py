@@ -18,7 +18,7 @@ from adversarial_lcd_ros.commands.common import (
     progress_bar,
 )
 from adversarial_lcd_ros.config import LabelConfig
-from adversarial_lcd_ros.settings import add_config_options, config_from_options
+from adversarial_lcd_ros.settings import add_config_option, add_config_options, config_from_options
 
 
 def add(commands: Commands) -> None:
@@ -36,8 +36,7 @@ def add(commands: Commands) -> None:
     parser.add_argument('--check', action='store_true',
                         help='hold the audit, or the rule that is chosen, against the exact '
                         'co-visibility beside the sequence')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+    add_config_option(parser)
     add_source_options(parser)
     add_config_options(parser, LabelConfig, 'label-')
 

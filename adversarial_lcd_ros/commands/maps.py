@@ -8,7 +8,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-import os
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Any
@@ -17,14 +16,16 @@ from adversarial_lcd_ros.commands.common import (
     Commands,
     add_command,
     add_json_option,
+    check_counts,
     make_console,
     print_json,
     print_rows,
     progress_bar,
+    worker_count,
 )
 from adversarial_lcd_ros.config import MapConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.settings import add_config_options, config_from_options
+from adversarial_lcd_ros.settings import add_config_option, add_config_options, config_from_options
 
 if TYPE_CHECKING:
     from adversarial_lcd_ros.evaluation.kinds.base import Results, ResultsKind
@@ -63,8 +64,7 @@ def _add_shared_options(parser: ArgumentParser) -> None:
                         'where the results do not say, or it has moved')
     parser.add_argument('--jobs', type=int, metavar='N',
                         help='processes (default: one for each core)')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML); options of the command line win over it')
+    add_config_option(parser)
     add_config_options(parser, MapConfig, PREFIX)
 
 
@@ -105,6 +105,7 @@ def check_source(sequence: Path) -> None:
 
 
 def _map(options: Namespace) -> None:
+    check_counts(options, 'jobs')
     if options.export_g2o is not None:
         _export(options)
         return
@@ -127,7 +128,7 @@ def make(folders: Sequence[Path], options: Namespace, *, output: Path | None = N
     opened = [_open_replay(folder) for folder in folders]
     if output is None and len(folders) > 1:
         raise ConfigError(f'{len(folders)} replays: name a folder for their maps with --output')
-    with _Bars() as bars, local_workers(_processes(jobs)) as workers:
+    with _Bars() as bars, local_workers(worker_count(jobs)) as workers:
         summary = make_maps(folders, config_from_options(options, MapConfig), workers,
                             output=output, source=source, sweeps=sweeps, claims=claims,
                             command_line=sys.argv, progress=bars)
@@ -149,12 +150,6 @@ def _open_replay(folder: Path) -> tuple[ResultsKind, Results]:
     return kind, results
 
 
-def _processes(jobs: int | None) -> int:
-    if jobs is not None and jobs < 1:
-        raise ConfigError(f'--jobs {jobs}: expected 1 or more')
-    return jobs or os.cpu_count() or 1
-
-
 def _render(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.kinds import open_results
     from adversarial_lcd_ros.evaluation.maps.animation import FORMATS, animate
@@ -162,6 +157,7 @@ def _render(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.maps.summary import KIND
     from adversarial_lcd_ros.evaluation.workers import local_workers
 
+    check_counts(options, 'jobs')
     if options.steps < 1 or options.seconds < 0:
         raise ConfigError(f'--steps {options.steps}, --seconds {options.seconds:g}: expected 1 or '
                           'more, and 0 or more')
@@ -175,7 +171,7 @@ def _render(options: Namespace) -> None:
         draw_still(options.folder if is_map else options.folder / FOLDER, options.output)
         print(options.output)
         return
-    with _Bars() as bars, local_workers(_processes(options.jobs)) as workers:
+    with _Bars() as bars, local_workers(worker_count(options.jobs)) as workers:
         animate(options.folder, options.output, config_from_options(options, MapConfig), workers,
                 run=options.shown, steps=options.steps, seconds=options.seconds,
                 source=options.sequence, progress=bars)

@@ -158,4 +158,4 @@ def _streams(sequence: TargetSequence, cache: Path | None, variant: str) -> list
 
     with progress_bar(f'graphs of {Path(sequence.source).name}') as progress:
         return open_streams([sequence.source], sequence.nodes, sequence.builder, sequence.labels,
-                            cache, lambda _, done, total: progress(done, total), variant=variant)
+                            cache, progress, variant=variant)

@@ -12,7 +12,7 @@ import sys
 
 from adversarial_lcd_ros.commands.common import Commands, add_command, progress_bar
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig, LcdConfig
-from adversarial_lcd_ros.settings import chosen_settings, config_from_options
+from adversarial_lcd_ros.settings import add_config_option, chosen_settings, config_from_options
 
 
 def add(commands: Commands) -> None:
@@ -49,18 +49,13 @@ def add(commands: Commands) -> None:
                         'their order (default: the CREDITS or LICENSE file beside them)')
     parser.add_argument('--overwrite', action='store_true',
                         help='replace the artefacts of an earlier training')
-    parser.add_argument('--config', type=Path, metavar='FILE',
-                        help='settings (YAML) of graph_builder, lcd and labels')
+    add_config_option(parser, 'graph_builder, lcd and labels')
 
 
 def _train(options: Namespace) -> None:
     from adversarial_lcd_ros.sequences.part import SequencePart
-    from adversarial_lcd_ros.training.run import (
-        TRAINING_LABELS,
-        TrainingPlan,
-        default_targets,
-        train,
-    )
+    from adversarial_lcd_ros.training.plan import TRAINING_LABELS, TrainingPlan, default_targets
+    from adversarial_lcd_ros.training.run import train
 
     sources = [SequencePart.parse(text) for text in options.sequences]
     builder = config_from_options(options, BuilderConfig)

@@ -20,3 +20,9 @@ def file_digest(path: Path) -> str:
         return digest_of(read_bytes(path))
     except FileError as error:
         raise ModelError(f'{error}; name a file that "adversarial-lcd train" wrote') from error
+
+
+def model_digests(decision: Path) -> list[str]:
+    """Return the digests of a trained decision and of the network beside it, if it has one."""
+    return [file_digest(path) for path in (decision, decision.with_suffix('.onnx'))
+            if path.exists()]

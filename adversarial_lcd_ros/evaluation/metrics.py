@@ -4,13 +4,6 @@
 """
 Figures of a detector, and of what an attack took from it.
 
-Every scored frame has one outcome. ``TP``: a loop is there and a right match was declared.
-``FN``: a loop is there and nothing was declared. ``WM``, wrong match: a loop is there but the
-declared match is another place. ``FP``: no loop is there but one was declared. ``TN``: rightly
-silent. A wrong match is a missed loop (it counts among the false negatives) and also a false
-alarm (it counts against precision). ``UM``, untold match: one was declared with a match of which
-nobody can say whether it is right; the frame is in no figure of that run.
-
 The figure of a decline is balanced accuracy. The paper quotes accuracy on balanced pairs; in a
 replay the classes are what they are (240 loops to 61 new places on flat_tour).
 """
@@ -18,23 +11,21 @@ replay the classes are what they are (240 loops to 61 new places on flat_tour).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.metrics import matthews_corrcoef, precision_recall_curve
 
 from adversarial_lcd_ros.errors import EvaluationError
+from adversarial_lcd_ros.evaluation.outcomes import (
+    UNTOLD_MATCH,
+    Outcomes,
+    check_lengths,
+    outcomes,
+    right,
+    told_kind,
+)
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
-
-Outcomes = NDArray[np.str_]
-# What ground truth says of a frame, in words; only the first two are scored.
-FRAME_KINDS = ('positive', 'negative', 'scale', 'between', 'no_candidate', 'no_ground_truth')
-# The outcome of a frame whose declared match cannot be told.
-UNTOLD_MATCH = 'UM'
-# What an attack did to a frame, by its outcomes before and after.
-EFFECTS = {('TP', 'FN'): 'suppressed', ('TP', 'WM'): 'diverted', ('TN', 'FP'): 'invented',
-           ('FN', 'TP'): 'regained', ('WM', 'TP'): 'regained', ('FP', 'TN'): 'withdrawn'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,45 +120,6 @@ class Effect:
     decline_pp: float | None
 
 
-def outcomes(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
-             match_correct: NDArray[np.bool_],
-             match_told: NDArray[np.bool_] | None = None) -> Outcomes:
-    """
-    Return the outcome of every frame, shape (n,): TP, FN, WM, FP, TN, UM, or '' if not scored.
-
-    Parameters
-    ----------
-    kind : int8, (n,)
-        +1 a loop is there, -1 there is none, 0 not scored.
-    is_loop : bool, (n,)
-        The detector declared a loop.
-    match_correct : bool, (n,)
-        The match it named, declared or not, is right.
-    match_told : bool, (n,), optional
-        Whether that can be said at all; without, it can of every match.
-
-    """
-    told = np.ones(len(kind), bool) if match_told is None else np.asarray(match_told, bool)
-    _check_lengths(kind=kind, is_loop=is_loop, match_correct=match_correct, match_told=told)
-    positive, negative = kind == POSITIVE, kind == NEGATIVE
-    declared, right = np.asarray(is_loop, bool), np.asarray(match_correct, bool)
-    return np.select(
-        [(positive | negative) & declared & ~told, positive & declared & right,
-         positive & declared, positive, negative & declared, negative],
-        [UNTOLD_MATCH, 'TP', 'WM', 'FN', 'FP', 'TN'], '')
-
-
-def told_kind(kind: NDArray[np.int8], *outcome: Outcomes) -> NDArray[np.int8]:
-    """Return the kind of every frame, 0 also where a run's match cannot be told."""
-    untold = np.logical_or.reduce([found == UNTOLD_MATCH for found in outcome])
-    return np.where(untold, 0, kind).astype(np.int8)
-
-
-def right(outcome: Outcomes) -> NDArray[np.bool_]:
-    """Tell which outcomes are right decisions."""
-    return np.isin(outcome, ('TP', 'TN'))
-
-
 def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
             probability: NDArray[np.float64], match_correct: NDArray[np.bool_],
             match_told: NDArray[np.bool_] | None = None) -> Metrics:
@@ -187,7 +139,7 @@ def measure(kind: NDArray[np.int8], is_loop: NDArray[np.bool_],
         Lengths differ, or a probability is not within 0 to 1.
 
     """
-    _check_lengths(kind=kind, probability=probability)
+    check_lengths(kind=kind, probability=probability)
     if not np.all((probability >= 0) & (probability <= 1)):
         raise EvaluationError('a probability is not within 0 to 1: the detector is broken')
     told = np.ones(len(kind), bool) if match_told is None else np.asarray(match_told, bool)
@@ -264,7 +216,7 @@ def effect(kind: NDArray[np.int8], before: Outcomes, after: Outcomes) -> Effect:
         ``outcomes`` of the two runs.
 
     """
-    _check_lengths(kind=kind, before=before, after=after)
+    check_lengths(kind=kind, before=before, after=after)
     told = told_kind(kind, before, after)
     left_out, kind = int((told != kind).sum()), told
     lost = np.where(right(before), 1, 0) - np.where(right(after), 1, 0)
@@ -288,12 +240,6 @@ def first_closure_latency_s(stamp_ns: NDArray[np.int64], kind: NDArray[np.int8],
     if not len(found):
         return None
     return float(stamp_ns[found[0]] - stamp_ns[loops[0]]) * 1e-9
-
-
-def _check_lengths(**arrays: NDArray[Any]) -> None:
-    if len({len(array) for array in arrays.values()}) > 1:
-        found = ', '.join(f'{name} {len(array)}' for name, array in arrays.items())
-        raise EvaluationError(f'one value a frame is expected of each, found {found}')
 
 
 def _ratio(part: int, whole: int) -> float | None:

@@ -25,6 +25,7 @@ _INDEX = 'pictures.json'
 _JPEG_QUALITY = 82
 _MAX_JPEG_BYTES = 16 * MIB
 
+
 @dataclass(frozen=True, eq=False)
 class Picture:
     """

@@ -27,6 +27,7 @@ CONFIGURATION, ENVIRONMENT, PICTURES = 'configuration.json', 'environment.json',
 LATEST = 'latest'
 PARTIAL = '.partial'
 
+
 class ResultsFolder:
     """
     A results folder that looks finished only when it is.

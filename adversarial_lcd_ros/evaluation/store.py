@@ -68,7 +68,6 @@ class CellStore:
                                   'the same command again: finished cells are kept') from error
         self.rows[key] = kept
 
-
     def check(self, keys: Iterable[str], columns: Columns) -> None:
         """
         Look whether rows have the columns that whoever made them writes.

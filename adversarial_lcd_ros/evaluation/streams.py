@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 import hashlib
 from pathlib import Path
 
@@ -21,9 +21,9 @@ from adversarial_lcd_ros.ground_truth.labels import FrameLabels
 from adversarial_lcd_ros.messages.codec import encode_graph
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
+from adversarial_lcd_ros.sequences.sequence import Progress
 
 _KEPT = 6
-
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,7 @@ class Stream:
 
 
 def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderConfig,
-                 config: LabelConfig, cache: Path | None,
-                 progress: Callable[[str, int, int], None],
+                 config: LabelConfig, cache: Path | None, progress: Progress,
                  own_labels: Mapping[str, LabelConfig] | None = None, variant: str = ''
                  ) -> list[Stream]:
     """
@@ -104,7 +103,7 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
     cache : Path or None
         Folder of built graphs; None: the user's.
     progress : callable
-        Called with the source, frames done and frames in all.
+        Called with frames done and to do, of one sequence after the other.
     own_labels : mapping, optional
         Settings of labels in place of ``config``, by name of the sequence.
     variant : str
@@ -125,7 +124,7 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
         labels: FrameLabels | None = None
         for size in nodes:
             sized = replace(settings, features=size)
-            sequence = open_graphs(source, sized, cache, partial(progress, source))
+            sequence = open_graphs(source, sized, cache, progress)
             if sequence.name in taken:
                 raise EvaluationError(f'two sequences are called {sequence.name}: rename one of '
                                       'the folders, or leave one out')

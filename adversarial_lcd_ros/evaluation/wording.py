@@ -52,8 +52,8 @@ def percent(value: float | None, digits: int = 1) -> str:
 
 
 def number(value: float | None, digits: int = 1) -> str:
-    """Return a number with a fixed count of decimals and thousands set apart."""
-    return UNDEFINED if value is None else f'{value:,.{digits}f}'
+    """Return a number with fixed decimals and thousands set apart; nothing has no sign."""
+    return UNDEFINED if value is None else f'{round(value, digits) + 0.0:,.{digits}f}'
 
 
 def mean_count(value: float | None) -> str:

@@ -42,6 +42,12 @@ def read_text(path: Path) -> str:
     return text
 
 
+def printable(text: str) -> str:
+    """Return a text with escapes for what would move a terminal: names of inputs may hold it."""
+    return ''.join(character if character.isprintable() else ascii(character)[1:-1]
+                   for character in text)
+
+
 def text_rows(path: Path, columns: str, separator: str | None = None,
               ) -> Iterator[tuple[str, list[str]]]:
     """
@@ -51,7 +57,8 @@ def text_rows(path: Path, columns: str, separator: str | None = None,
     ----------
     path : Path
     columns : str
-        Names of the columns, apart by blanks; a last one '...' stands for any number more.
+        Names of the columns, apart by blanks; a last one '...' stands for any number more, and
+        one 'filename' for the rest of the line, as names may hold blanks.
     separator : str, optional
         Between the columns; blanks unless given.
 
@@ -64,11 +71,12 @@ def text_rows(path: Path, columns: str, separator: str | None = None,
     names = columns.split()
     is_open = names[-1] == '...'
     expected = len(names) - is_open
+    splits = expected - 1 if names[-1] == 'filename' else -1
     for number, line in enumerate(read_text(path).splitlines(), 1):
         bare = _COMMENT.sub('', line).strip()
         if not bare:
             continue
-        fields = [field.strip() for field in bare.split(separator)]
+        fields = [field.strip() for field in bare.split(separator, splits)]
         if len(fields) < expected or (len(fields) > expected and not is_open):
             raise SequenceError(f'{path}, line {number}: {len(fields)} fields; expected '
                                 f'{expected}{" or more" * is_open}: {columns}')

@@ -30,7 +30,7 @@ from adversarial_lcd_ros.sequences.bags import bag_trajectory
 from adversarial_lcd_ros.sequences.detections import read_detections
 from adversarial_lcd_ros.sequences.frame import NO_PICTURE
 from adversarial_lcd_ros.sequences.part import SequencePart
-from adversarial_lcd_ros.sequences.replay import Replay, read_payloads
+from adversarial_lcd_ros.sequences.replay import Replay, read_messages
 from adversarial_lcd_ros.sequences.sequence import Progress
 from adversarial_lcd_ros.sequences.yolo_labels import convert_labels
 from adversarial_lcd_ros.vision.builder import GraphBuilder
@@ -251,7 +251,7 @@ def holds_graphs(path: Path) -> bool:
 def _recorded_graphs(part: SequencePart) -> GraphSequence:
     """Return the graphs of a bag without images."""
     topic, = Replay(part.path, ReplayConfig()).frame_topics
-    graphs = [decode_graph(payload) for _, payload in read_payloads(part.path, topic)]
+    graphs = read_messages(part.path, topic, decode_graph)
     sizes = sorted({(graph.width, graph.height) for graph in graphs})
     if len(sizes) != 1:
         raise SequenceError(f'bag {part.path} has graphs of images of several sizes on {topic}: '

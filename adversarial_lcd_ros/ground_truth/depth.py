@@ -16,7 +16,7 @@ from adversarial_lcd_ros.compiled.shared_surface import shared_surface
 from adversarial_lcd_ros.errors import EvaluationError, FileError, SequenceError
 from adversarial_lcd_ros.files.arrays import read_npz
 from adversarial_lcd_ros.files.text import text_rows
-from adversarial_lcd_ros.poses.trajectory import parse_stamp_ns
+from adversarial_lcd_ros.poses.trajectory import nearest_in_time, parse_stamp_ns
 from adversarial_lcd_ros.sequences.companions import DEPTH_ARCHIVE
 
 DEPTH_LIST = 'depth.txt'
@@ -48,11 +48,7 @@ class DepthImages:
 
     def at(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the depth images nearest in time to some frames; all 0 where none is near."""
-        row = np.searchsorted(self.stamp_ns, stamp_ns).clip(1, max(len(self.stamp_ns) - 1, 1))
-        row = np.minimum(row, len(self.stamp_ns) - 1)
-        before = np.maximum(row - 1, 0)
-        earlier = np.abs(self.stamp_ns[before] - stamp_ns) <= np.abs(self.stamp_ns[row] - stamp_ns)
-        row = np.where(earlier, before, row)
+        row = nearest_in_time(self.stamp_ns, stamp_ns)
         depth: NDArray[np.float32] = self.depth_m[row].copy()
         depth[np.abs(self.stamp_ns[row] - stamp_ns) > TOLERANCE_NS] = 0
         return depth

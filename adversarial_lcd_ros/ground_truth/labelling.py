@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,6 +76,16 @@ class Views:
     trajectory: Trajectory
     source: Path
     graphs: Sequence[MultiTierGraph] = ()
+
+    @cached_property
+    def pictures(self) -> CameraSequence | None:
+        """The sequence that the pictures of the frames are in; None where there are none."""
+        if is_bag(self.source):
+            with BagFile(self.source) as bag:
+                if not bag.of_type(IMAGE, COMPRESSED_IMAGE):
+                    return None
+        sequence = open_sequence(self.source)
+        return None if sequence.detections else sequence
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,21 +193,19 @@ def _camera(views: Views, config: LabelConfig) -> Camera:
 
 
 def _features(views: Views) -> ViewFeatures:
-    pictures = _pictures(views.source)
-    if pictures is None:
+    if views.pictures is None:
         return from_graphs(views.graphs, len(views.stamp_ns))
-    return from_pictures(_frames_at(pictures, views.stamp_ns))
+    return from_pictures(_frames_at(views.pictures, views.stamp_ns))
 
 
 def _first_bytes(views: Views) -> bytes:
-    pictures = _pictures(views.source)
-    if pictures is None:
+    if views.pictures is None:
         return b''.join(graph.node_digest for graph in views.graphs)
-    return next(_frames_at(pictures, views.stamp_ns[:1])).data
+    return next(_frames_at(views.pictures, views.stamp_ns[:1])).data
 
 
 def _known_focal(views: Views) -> Focal | None:
-    pictures = _pictures(views.source)
+    pictures = views.pictures
     if pictures is None or pictures.focal_length_px is None:
         return None
     return Focal(pictures.focal_length_px / pictures.image_size[0], 'calibration in the recording')
@@ -214,15 +223,6 @@ def _without_sight(evidence: Evidence, blind: NDArray[np.bool_],
     pair = blind[:, None] | blind[None, :]
     apart = (seen == 0) & (seen.T == 0)
     return replace(evidence, elsewhere=np.where(pair, apart, evidence.elsewhere))
-
-
-def _pictures(source: Path) -> CameraSequence | None:
-    if is_bag(source):
-        with BagFile(source) as bag:
-            if not bag.of_type(IMAGE, COMPRESSED_IMAGE):
-                return None
-    sequence = open_sequence(source)
-    return None if sequence.detections else sequence
 
 
 def _frames_at(sequence: CameraSequence, stamps: NDArray[np.int64]) -> Iterator[Frame]:

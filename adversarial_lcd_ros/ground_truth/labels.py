@@ -27,6 +27,7 @@ from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.ground_truth.evidence import Evidence
 from adversarial_lcd_ros.ground_truth.judgement import Judgement, judge_evidence, judge_poses
+from adversarial_lcd_ros.poses.trajectory import nearest_in_time
 from adversarial_lcd_ros.sequences import PLACE_INDEX, Trajectory
 
 POSITIVE, UNSCORED, NEGATIVE = 1, 0, -1
@@ -208,38 +209,16 @@ def located_poses(trajectory: Trajectory, stamps: NDArray[np.int64],
         None has.
 
     """
-    row, located = _nearest_pose(trajectory.stamp_ns, stamps, config.pose_tolerance_s)
+    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
+    row = nearest_in_time(trajectory.stamp_ns, stamps)
+    tolerance_ns = round(config.pose_tolerance_s * 1e9)
+    located: NDArray[np.bool_] = np.abs(trajectory.stamp_ns[row] - stamps) <= tolerance_ns
     if not located.any():
         raise EvaluationError(
             f'none of {len(stamps)} frames has a ground truth pose within '
             f'{config.pose_tolerance_s} s: is it the ground truth of this sequence?')
     return replace(trajectory, stamp_ns=stamps, position=trajectory.position[row],
                    quaternion=trajectory.quaternion[row]), located
-
-
-def relation(rows: Trajectory, image_size: tuple[int, int],
-             config: LabelConfig) -> NDArray[np.int8]:
-    """
-    Return how every two frames are related by their poses, shape (n, n), symmetric.
-
-    +1 same place: a loop. The views are near (overlap seen from both sides, distance, angle),
-    at least ``min_gap_s`` apart, and the camera looked elsewhere at some time in between.
-    -1 different places: the views share almost nothing, whichever side one looks from.
-    0 all else, also every pair less than ``min_gap_s`` apart.
-
-    Parameters
-    ----------
-    rows : Trajectory
-        One pose a frame, with the stamps of the frames, strictly ascending.
-    image_size : (int, int)
-        Width and height, pixels.
-    config : LabelConfig
-        Thresholds.
-
-    """
-    stamps = _checked_stamps(rows.stamp_ns)
-    return _relation(judge_poses(rows, image_size, config),
-                     count_old_enough(stamps, config.min_gap_s))
 
 
 def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
@@ -252,19 +231,6 @@ def _checked_stamps(stamp_ns: ArrayLike) -> NDArray[np.int64]:
         raise EvaluationError(f'frame {at} is not later than the one before it: frames to label '
                               'must ascend in time')
     return stamps
-
-
-def _nearest_pose(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64],
-                  tolerance_s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    # Ground truth of real sequences has holes; a hole costs its frames, not the evaluation.
-    if not len(known_ns):
-        raise EvaluationError('the ground truth holds no pose: expected at least one')
-    after = np.clip(np.searchsorted(known_ns, wanted_ns), 1, max(len(known_ns) - 1, 1))
-    after = np.minimum(after, len(known_ns) - 1)
-    before = np.maximum(after - 1, 0)
-    earlier = np.abs(wanted_ns - known_ns[before]) <= np.abs(known_ns[after] - wanted_ns)
-    row = np.where(earlier, before, after)
-    return row, np.abs(known_ns[row] - wanted_ns) <= round(tolerance_s * 1e9)
 
 
 def count_old_enough(stamps: NDArray[np.int64], min_gap_s: float) -> NDArray[np.int64]:
@@ -281,8 +247,12 @@ def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelCon
 
     Parameters
     ----------
-    rows, image_size, config
-        See ``relation``.
+    rows : Trajectory
+        One pose a frame, with the stamps of the frames.
+    image_size : (int, int)
+        Width and height, pixels.
+    config : LabelConfig
+        Thresholds.
 
     """
     judgement = judge_poses(rows, image_size, replace(config, rule='overlap'))
@@ -290,6 +260,13 @@ def likely_loops(rows: Trajectory, image_size: tuple[int, int], config: LabelCon
 
 
 def _relation(judgement: Judgement, candidates: NDArray[np.int64]) -> NDArray[np.int8]:
+    """
+    Return how every two frames are related, shape (n, n), symmetric.
+
+    +1 same place: a loop. The views are near, at least ``min_gap_s`` apart, and the camera looked
+    elsewhere at some time in between. -1 different places: the views share almost nothing,
+    whichever side one looks from. 0 all else, also every pair less than ``min_gap_s`` apart.
+    """
     count = len(candidates)
     index = np.arange(count)
     # The newest earlier frame that looked elsewhere: a loop partner must be older than that.

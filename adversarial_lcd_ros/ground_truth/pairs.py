@@ -45,7 +45,7 @@ def sample_pairs(relation: NDArray[np.int8], rng: np.random.Generator, count: in
     Parameters
     ----------
     relation : int8, (n, n)
-        From ``labels.relation``.
+        From ``FrameLabels``.
     rng : numpy.random.Generator
         Source of the draw.
     count : int

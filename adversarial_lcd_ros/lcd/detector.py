@@ -80,8 +80,7 @@ class LoopClosureDetector:
         self.config = config or LcdConfig()
         self.judging = Judge(self.config)
         self._database = Database()
-        self._view = lru_cache(CACHED_VIEWS)(
-            lambda index: self.judging.scoring.view(self._database[index]))
+        self._view = lru_cache(CACHED_VIEWS)(lambda index: View(self._database[index]))
         self._latest: QueryNodes | None = None
 
     @property
@@ -101,9 +100,20 @@ class LoopClosureDetector:
         return decision
 
     def remember(self, graph: MultiTierGraph) -> None:
-        """Store a graph as a keyframe without judging it, while there is room."""
+        """
+        Store a graph as a keyframe without judging it, while there is room.
+
+        It is stored as defences have prepared it: what a keyframe is compared with later finds
+        that done.
+
+        Raises
+        ------
+        GraphError
+            It is of another variant than the target needs.
+
+        """
         if self.has_room:
-            self._database.add(graph)
+            self._database.add(self.judging.scoring.prepare(graph))
 
     @property
     def has_room(self) -> bool:

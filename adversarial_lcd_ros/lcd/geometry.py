@@ -41,11 +41,6 @@ class Inliers:
 NONE = Inliers(0, 0.0)
 
 
-def count_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> int:
-    """Return how many matched features of two frames fit one fundamental matrix."""
-    return find_inliers(one, other, threshold_px).count
-
-
 def find_inliers(one: MultiTierGraph, other: MultiTierGraph, threshold_px: float) -> Inliers:
     """
     Return the matched features of two frames that fit one fundamental matrix.

@@ -69,6 +69,9 @@ class Scoring:
     def __init__(self, target: Target, defences: Sequence[Defence] = ()) -> None:
         self.target = target
         self.defences = tuple(defences)
+        # The graph that was prepared last, as received and as prepared: a decision asks for it
+        # when nodes are compared, when it is scored, and when it is remembered.
+        self._latest: tuple[MultiTierGraph, MultiTierGraph] | None = None
 
     @classmethod
     def of(cls, config: LcdConfig, network: Path | None = None) -> Scoring:
@@ -92,7 +95,7 @@ class Scoring:
 
     def prepare(self, graph: MultiTierGraph) -> MultiTierGraph:
         """
-        Return the graph that is judged in place of one received.
+        Return the graph that is judged in place of one received; again at no cost.
 
         Raises
         ------
@@ -100,8 +103,10 @@ class Scoring:
             It is of another variant than the target needs.
 
         """
-        check_variant(self.target, graph)
-        return prepared(graph, self.defences)
+        if self._latest is None or self._latest[0] is not graph:
+            check_variant(self.target, graph)
+            self._latest = graph, prepared(graph, self.defences)
+        return self._latest[1]
 
     def compare(self, query: View, references: Sequence[View]) -> Compared:
         """Return what scores a query, and others with its nodes, with every reference."""
@@ -111,7 +116,7 @@ class Scoring:
         return Compared(nodes, self.target.prepare(query, nodes))
 
     def support(self, query: MultiTierGraph, match: MultiTierGraph) -> float:
-        """Return how far a loop between two graphs as received is borne out; 1: it stands."""
+        """Return how far a loop between two graphs is borne out, by nodes; 1: it stands."""
         return min((defence.support(query, match) for defence in self.defences), default=1.0)
 
     def unexplained(self, graph: MultiTierGraph) -> int:

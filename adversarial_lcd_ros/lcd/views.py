@@ -256,17 +256,17 @@ class Comparison:
             weight = np.zeros(view.graph.node_count)
             node[match.reference], weight[match.reference] = match.query, match.weight
             u, v = node[view.graph.edge[:, 0]], node[view.graph.edge[:, 1]]
-            both = (u >= 0) & (v >= 0)
+            both = np.flatnonzero((u >= 0) & (v >= 0))
             for keeps in self._keeps:
-                ends = np.stack([u[both], v[both]], axis=1)
-                both[both] = keeps(self._query, view, ends, view.graph.edge[both].astype(np.int64))
-            keys.append((np.minimum(u, v) * self._query_nodes + np.maximum(u, v))[both])
-            weights.append((weight[view.graph.edge[:, 0]] * weight[view.graph.edge[:, 1]])[both])
+                both = both[keeps(self._query, view, np.stack([u[both], v[both]], axis=1),
+                                  view.graph.edge[both].astype(np.int64))]
+            u, v, ends = u[both], v[both], view.graph.edge[both]
+            keys.append(np.minimum(u, v) * self._query_nodes + np.maximum(u, v))
+            weights.append(weight[ends[:, 0]] * weight[ends[:, 1]])
             owners.append(np.full(len(keys[-1]), owner))
         key = _join(keys, np.int64)
         order = np.argsort(key, kind='stable')
         return key[order], _join(weights, np.float64)[order], _join(owners, np.int64)[order]
-
 
     def with_credit(self, keeps: Keeps) -> Comparison:
         """

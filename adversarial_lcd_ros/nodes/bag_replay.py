@@ -31,7 +31,7 @@ from adversarial_lcd_ros.messages.authentic import Gate
 from adversarial_lcd_ros.messages.payload import WIRE_TYPE, unwrap
 from adversarial_lcd_ros.nodes.endpoints import MirroredSubscription, payload_qos
 from adversarial_lcd_ros.nodes.parameters import load_key
-from adversarial_lcd_ros.nodes.peers import Strangers, getting_ready
+from adversarial_lcd_ros.nodes.peers import Listening, Strangers, getting_ready
 from adversarial_lcd_ros.nodes.progress import progress
 from adversarial_lcd_ros.nodes.runtime import EXIT_OK, Manual, PipelineNode, run_node
 from adversarial_lcd_ros.nodes.streams import SessionWatch
@@ -50,8 +50,11 @@ _SPIN_S = 0.1
 # A gap that looks like a replay which hangs.
 _LONG_S = 10.0
 # The other ends have matched as seen from here; this is for them to see it too, and each other.
-# A quarter of a second was too short once on a busy machine: the first graph was lost.
-_SETTLE_S = 1.0
+# A quarter of a second was too short once on a busy machine: the first graph was lost. Nodes of
+# this package say when they do; a listener whose QoS does not fit is never matched.
+_SETTLE_S, _LONGEST_SETTLE_S = 1.0, 20.0
+# Where nodes that have not found each other yet would lose the first frame, or an answer.
+_HEARD = (*RECORDED, 'answer')
 _LOOK_PERIOD_S = 1.0
 # What a supervisor is told once the other nodes are there.
 _PLAYING = 'playing'
@@ -233,13 +236,17 @@ class BagReplayNode(PipelineNode):
     def _await_listeners(self) -> None:
         """Wait until the first frame will be heard, all along the pipeline."""
         limit_s = self._config.start_timeout_s
+        needs_all = self._config.lockstep or self._recorder
+        listening = Listening(self, _HEARD if needs_all else ())
         waited_since_s = settled_since_s = looked_s = time.monotonic()
         while True:
             now_s = time.monotonic()
             self.diagnostics.waiting_for = self._missing()
             if self.diagnostics.waiting_for:
                 settled_since_s = now_s
-            elif now_s - settled_since_s >= _SETTLE_S:
+            elif now_s - settled_since_s >= (
+                    _LONGEST_SETTLE_S if listening.lacking() else _SETTLE_S):
+                listening.close()
                 return
             late = bool(limit_s) and now_s - waited_since_s >= limit_s
             if late or now_s - looked_s >= _LOOK_PERIOD_S:
@@ -270,6 +277,9 @@ class BagReplayNode(PipelineNode):
                 return f'subscriber of {name}'
             if topic in self._inputs and self.count_publishers(topic) and not mine:
                 return f'publisher of {name}'
+        if (REPORTS in self._inputs and self.count_publishers(REPORTS)
+                and self._inputs[REPORTS].subscription is None):
+            return f'publisher of {self._inputs[REPORTS].topic}'
         return ''
 
     def _until_decided(self, window: int) -> None:

@@ -11,7 +11,6 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
@@ -28,6 +27,8 @@ if TYPE_CHECKING:
     from adversarial_lcd_ros.nodes.runtime import PipelineNode
 
 PAYLOAD_DEPTH = 100
+# On /diagnostics: how many hear a publisher, as it knows; a topic follows.
+LISTENERS = 'listeners of '
 _LOOK_PERIOD_S = 0.05
 _WATCH_PERIOD_S = 1.0
 _STALE_S = 5.0
@@ -45,10 +46,13 @@ def overridable() -> QoSOverridingOptions:
                                  QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY])
 
 
-def create_payload_publisher(node: Node, topic: str, qos: QoSProfile | None = None) -> Publisher:
+def create_payload_publisher(node: PipelineNode, topic: str,
+                             qos: QoSProfile | None = None) -> Publisher:
     """Return a publisher of payloads; give it the bytes of ``payload.wrap``."""
-    return node.create_publisher(UInt8MultiArray, topic, qos or payload_qos(),
-                                 qos_overriding_options=overridable())
+    publisher = node.create_publisher(UInt8MultiArray, topic, qos or payload_qos(),
+                                      qos_overriding_options=overridable())
+    node.diagnostics.gauges[LISTENERS + publisher.topic_name] = publisher.get_subscription_count
+    return publisher
 
 
 def steady_timer(node: PipelineNode, period_s: float, callback: Callable[[], None]) -> Any:

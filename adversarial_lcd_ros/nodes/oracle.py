@@ -9,8 +9,8 @@ import math
 import secrets
 from threading import Condition
 import time
+from typing import TYPE_CHECKING
 
-from rclpy.node import Node
 from std_msgs.msg import UInt8MultiArray
 
 from adversarial_lcd_ros.attack.oracle import OracleSilentError
@@ -27,6 +27,9 @@ from adversarial_lcd_ros.nodes.endpoints import (
 )
 from adversarial_lcd_ros.nodes.streams import SessionWatch
 
+if TYPE_CHECKING:
+    from adversarial_lcd_ros.nodes.runtime import PipelineNode
+
 _LOOK_S = 0.01
 _UNANSWERED = 3
 
@@ -39,7 +42,7 @@ class TopicOracle:
 
     Parameters
     ----------
-    node : Node
+    node : PipelineNode
     diagnostics : Diagnostics
         Counts queries, answers and silence.
     timeout_s : float
@@ -47,7 +50,7 @@ class TopicOracle:
 
     """
 
-    def __init__(self, node: Node, diagnostics: Diagnostics, timeout_s: float) -> None:
+    def __init__(self, node: PipelineNode, diagnostics: Diagnostics, timeout_s: float) -> None:
         self._diagnostics = diagnostics
         self._timeout_s = timeout_s
         self._changed = Condition()

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-ROS parameters made from the settings of config.py: same names, defaults, ranges and texts.
+ROS parameters made from the settings of the package: same names, defaults, ranges and texts.
 
 Keys of a parameter file are ``/**/<node>``: one without the wildcard is missed by a node in a
 namespace, and ``/**`` would give each node the parameters of the others, which it refuses as

@@ -65,7 +65,7 @@ class Manual:
 
 class PipelineNode(Node):  # type: ignore[misc]
     """
-    A node whose parameters are settings of config.py, with counts on /diagnostics.
+    A node whose parameters are settings of the package, with counts on /diagnostics.
 
     Parameters
     ----------

@@ -59,8 +59,7 @@ def read_poses(path: Path, stamps_ns: ArrayLike) -> Trajectory:
     if len(poses) != len(stamps):
         raise SequenceError(f'{path} has {len(poses)} poses without stamps, for {len(stamps)} '
                             'frames: expected one a frame')
-    there = np.isfinite(poses).all(axis=(1, 2))
-    return matrix_trajectory(stamps[there], poses[there])
+    return matrix_trajectory(stamps, poses, path)
 
 
 def image_poses(path: Path, ticks_ns: NDArray[np.int64],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+import re
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,7 @@ from adversarial_lcd_ros.files.text import text_rows
 from adversarial_lcd_ros.poses.trajectory import NORM_TOLERANCE, Trajectory, parse_stamp_ns
 
 _MAX_NS = 2**63 - 1
+_NANOSECONDS = re.compile('[0-9]{1,19}')
 _ORTHOGONAL_TOLERANCE = 0.01
 
 
@@ -58,11 +60,14 @@ def read_euroc(path: Path) -> Trajectory:
     rows = _PoseRows(path, 'timestamp,x,y,z,qw,qx,qy,qz')
     for where, fields in text_rows(path, 'timestamp x y z qw qx qy qz ...', ','):
         try:
-            stamp_ns, (x, y, z, qw, *imaginary) = int(fields[0]), map(float, fields[1:8])
+            x, y, z, qw, *imaginary = map(float, fields[1:8])
         except ValueError as error:
             raise SequenceError(f'{where}: {error}') from None
-        if not 0 <= stamp_ns <= _MAX_NS:
-            raise SequenceError(f'{where}: {fields[0]} is no time stamp in nanoseconds')
+        if not _NANOSECONDS.fullmatch(fields[0]) or int(fields[0]) > _MAX_NS:
+            raise SequenceError(f'{where}: {fields[0]} is no time stamp in nanoseconds; poses '
+                                f'between commas are read as EuRoC writes them, {rows.columns}, '
+                                'and those of TUM between blanks')
+        stamp_ns = int(fields[0])
         rows.add(where, stamp_ns, [x, y, z, *imaginary, qw])
     return rows.trajectory()
 
@@ -128,9 +133,19 @@ def check_pose_matrix(matrix: NDArray[np.float64], what: str) -> NDArray[np.floa
     return matrix
 
 
-def matrix_trajectory(stamps_ns: ArrayLike, matrices: NDArray[np.float64]) -> Trajectory:
-    """Return poses given as matrices, float64 (n, 4, 4), with a stamp each."""
-    return Trajectory(np.asarray(stamps_ns, np.int64), matrices[:, :3, 3],
+def matrix_trajectory(stamps_ns: ArrayLike, matrices: NDArray[np.float64],
+                      source: Path) -> Trajectory:
+    """
+    Return poses given as matrices, float64 (n, 4, 4), with a stamp each.
+
+    Where tracking was lost a matrix is not finite: that frame has no pose. Raises SequenceError
+    where none has one.
+    """
+    known = np.isfinite(matrices).all(axis=(1, 2))
+    if not known.any():
+        raise SequenceError(f'{source}: none of {len(matrices)} poses is of finite numbers')
+    matrices = matrices[known]
+    return Trajectory(np.asarray(stamps_ns, np.int64)[known], matrices[:, :3, 3],
                       Rotation.from_matrix(matrices[:, :3, :3]).as_quat())
 
 

@@ -89,7 +89,7 @@ class Trajectory:
         """Tell for each stamp whether a pose is within the tolerance, bool (n,)."""
         stamps = np.asarray(stamps_ns, np.int64)
         near: NDArray[np.bool_] = np.abs(
-            self.stamp_ns[self._nearest(stamps)] - stamps) <= tolerance_ns
+            self.stamp_ns[nearest_in_time(self.stamp_ns, stamps)] - stamps) <= tolerance_ns
         return near
 
     def at(self, stamps_ns: ArrayLike, tolerance_ns: int = TOLERANCE_NS) -> Trajectory:
@@ -114,7 +114,7 @@ class Trajectory:
 
         """
         stamps = np.asarray(stamps_ns, np.int64)
-        row = self._nearest(stamps)
+        row = nearest_in_time(self.stamp_ns, stamps)
         offset = np.abs(self.stamp_ns[row] - stamps)
         if (offset > tolerance_ns).any():
             at = int(np.argmax(offset > tolerance_ns))
@@ -139,12 +139,6 @@ class Trajectory:
             return float('nan')
         return float(np.linalg.norm(np.diff(self.position, axis=0), axis=1).sum())
 
-    def _nearest(self, stamps: NDArray[np.int64]) -> NDArray[np.int64]:
-        after = np.minimum(np.searchsorted(self.stamp_ns, stamps), len(self) - 1)
-        before = np.maximum(after - 1, 0)
-        earlier = np.abs(stamps - self.stamp_ns[before]) <= np.abs(self.stamp_ns[after] - stamps)
-        return np.where(earlier, before, after)
-
     def _interpolate(self, stamps: NDArray[np.int64], tolerance_ns: int,
                      position: NDArray[np.float64], quaternion: NDArray[np.float64]) -> None:
         after = np.clip(np.searchsorted(self.stamp_ns, stamps), 1, len(self) - 1)
@@ -159,6 +153,29 @@ class Trajectory:
         seconds = (self.stamp_ns - self.stamp_ns[0]) / 1e9
         wanted = np.clip((stamps[inside] - self.stamp_ns[0]) / 1e9, seconds[0], seconds[-1])
         quaternion[inside] = Slerp(seconds, Rotation.from_quat(self.quaternion))(wanted).as_quat()
+
+
+def nearest_in_time(known_ns: NDArray[np.int64], wanted_ns: NDArray[np.int64]
+                    ) -> NDArray[np.int64]:
+    """
+    Return which of some ascending stamps is nearest to each wanted one; of two the earlier.
+
+    Parameters
+    ----------
+    known_ns : int64, (k,)
+        Ascending, at least one.
+    wanted_ns : int64, (n,)
+
+    Returns
+    -------
+    int64, (n,)
+        Indices of ``known_ns``.
+
+    """
+    after = np.minimum(np.searchsorted(known_ns, wanted_ns), len(known_ns) - 1)
+    before = np.maximum(after - 1, 0)
+    earlier = np.abs(wanted_ns - known_ns[before]) <= np.abs(known_ns[after] - wanted_ns)
+    return np.where(earlier, before, after)
 
 
 def parse_stamp_ns(text: str) -> int:

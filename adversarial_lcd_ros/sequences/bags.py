@@ -20,7 +20,13 @@ from adversarial_lcd_ros.poses.trajectory import Trajectory
 from adversarial_lcd_ros.sequences.bag_truth import BagTruth, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BagFile
 from adversarial_lcd_ros.sequences.encodings import DEPTH, is_camera, message_pixels
-from adversarial_lcd_ros.sequences.frame import Frame, check_camera_file, open_compressed
+from adversarial_lcd_ros.sequences.frame import (
+    Frame,
+    check_camera_file,
+    decode,
+    is_depth_file,
+    open_compressed,
+)
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.stamps import LOG, frame_stamps
 
@@ -189,8 +195,14 @@ def _frame(message: Any, what: str, size: tuple[int, int] | None) -> Frame:
         if hasattr(message, 'format'):
             data = bytes(message.data)
             check_camera_file(data, message.format)
-            return open_compressed(stamp_ns, data, f'format {message.format!r}', size)
-        frame = Frame.of_pixels(stamp_ns, message_pixels(message))
+            named = f'format {message.format!r}'
+            if not is_depth_file(data):
+                return open_compressed(stamp_ns, data, named, size)
+            # A camera's 16 bits (mono16): once the format is forgotten they would look like depth.
+            pixels = np.ascontiguousarray(decode(data, named)[:, :, 0])
+        else:
+            pixels = message_pixels(message)
+        frame = Frame.of_pixels(stamp_ns, pixels)
     except (SequenceError, CodecError) as error:
         raise SequenceError(f'{what}: {error}') from error
     if (size or (frame.width, frame.height)) != (frame.width, frame.height):

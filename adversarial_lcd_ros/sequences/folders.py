@@ -175,7 +175,7 @@ def seven_scenes(folder: Path, rate_hz: float | None) -> Sequence:
     poses = np.stack([_pose_matrix(
         path.with_name(path.name.replace(_SEVEN_SCENES_COLOUR, '.pose.txt'))) for path in paths])
     stamps = ticks(len(paths), rate_hz)
-    return file_sequence(folder, paths, stamps, matrix_trajectory(stamps, poses))
+    return file_sequence(folder, paths, stamps, matrix_trajectory(stamps, poses, folder))
 
 
 def _pose_matrix(path: Path) -> NDArray[np.float64]:

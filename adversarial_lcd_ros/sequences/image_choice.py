@@ -11,7 +11,12 @@ from pathlib import Path
 import re
 
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.sequences.image_files import images_in, is_depth_image
+from adversarial_lcd_ros.sequences.image_files import (
+    OTHER_PICTURES,
+    count_of,
+    images_in,
+    is_depth_image,
+)
 
 # cam0_00012.png: the first number is the camera's.
 _CAMERA_NUMBER = re.compile(r'([a-z]+_?[0-9])(?=[_-])')
@@ -48,7 +53,9 @@ def camera_images(folder: Path, camera: str | None) -> tuple[list[Path], tuple[s
         raise SequenceError(
             f'{folder} holds {len(depth)} PNG of 16 bits without colour, as depth maps are: name '
             'the folder of the camera, or convert them to 8 bits')
-    notes = (f'{folder}: {len(depth)} depth maps are not taken',) if depth else ()
+    others = count_of(folder, OTHER_PICTURES)
+    notes = (*((f'{folder}: {len(depth)} depth maps are not taken',) if depth else ()),
+             *((f'{folder}: {others} are not taken: convert them to PNG',) if others else ()))
     views = _views(pictures)
     if camera is not None:
         pictures = [path for path in pictures if path.name.startswith(camera)]

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 import re
@@ -20,6 +21,10 @@ from adversarial_lcd_ros.sequences.sequence import Sequence
 
 DEFAULT_RATE_HZ = 30.0
 _SUFFIXES = ('.jpg', '.jpeg', '.png', '.webp')
+# What is not read, though somebody may take it for a sequence, or a part of one.
+OTHER_PICTURES = ('.avif', '.bmp', '.exr', '.gif', '.heic', '.jp2', '.pbm', '.pgm', '.ppm', '.tif',
+                  '.tiff')
+PACKED = ('.7z', '.bz2', '.gz', '.rar', '.tar', '.tgz', '.xz', '.zip', '.zst', '.zstd')
 _HEADER_BYTES = 32
 MAX_PICTURE_BYTES = 128 * MIB
 
@@ -38,9 +43,16 @@ def images_in(folder: Path) -> list[Path]:
         for part in re.split(r'([0-9]+)', path.name)])
 
 
+def count_of(folder: Path, suffixes: tuple[str, ...]) -> str:
+    """Return how many files of some kinds are in a folder, in words; '' if there is none."""
+    kinds = Counter(path.suffix.lower() for path in folder.iterdir() if not is_hidden(path))
+    return ', '.join(f'{kinds[suffix]} {suffix}' for suffix in suffixes if kinds[suffix])
+
+
 def is_depth_image(path: Path) -> bool:
     """Tell whether a file is a PNG of 16 bits a pixel without colour."""
-    if path.suffix.lower() != '.png':
+    # Whoever reads a pipe or a folder refuses it; opening a pipe may wait for ever.
+    if path.suffix.lower() != '.png' or not path.is_file():
         return False
     try:
         with path.open('rb') as file:

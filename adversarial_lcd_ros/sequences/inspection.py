@@ -20,6 +20,7 @@ from adversarial_lcd_ros.messages import codec
 from adversarial_lcd_ros.messages.payload import PAYLOAD_TYPES, payload_of
 from adversarial_lcd_ros.sequences.bagfile import BagFile
 from adversarial_lcd_ros.sequences.opening import open_sequence
+from adversarial_lcd_ros.sequences.replay import decoded
 
 _DECODERS: Mapping[str, Callable[[bytes], Any]] = {
     'MultiTierGraph': codec.decode_graph,
@@ -137,7 +138,7 @@ def _topic(bag: BagFile, name: str) -> TopicSummary:
     payload, _ = identify_payload(next(_payloads(bag, name)))
     if payload != 'MultiTierGraph':
         return TopicSummary(name, kind, count, payload)
-    statistics = GraphSizes.of(codec.decode_graph(data) for data in _payloads(bag, name))
+    statistics = GraphSizes.of(decoded(bag.path, name, _payloads(bag, name), codec.decode_graph))
     return TopicSummary(name, kind, count, payload, statistics)
 
 

@@ -18,7 +18,13 @@ from adversarial_lcd_ros.sequences.bag_truth import NO_TRUTH, TruthOptions
 from adversarial_lcd_ros.sequences.bagfile import is_bag
 from adversarial_lcd_ros.sequences.bags import bag_sequence
 from adversarial_lcd_ros.sequences.detections import DETECTIONS_FILE
-from adversarial_lcd_ros.sequences.image_files import images_in, is_hidden
+from adversarial_lcd_ros.sequences.image_files import (
+    OTHER_PICTURES,
+    PACKED,
+    count_of,
+    images_in,
+    is_hidden,
+)
 from adversarial_lcd_ros.sequences.layouts import LAYOUTS, Options, find_layout
 from adversarial_lcd_ros.sequences.sequence import Sequence
 from adversarial_lcd_ros.sequences.video import is_video, video_sequence
@@ -139,13 +145,15 @@ def _image_folder(path: Path, ground_truth: Path | str | None, rate_hz: float | 
     inside = _recordings_in(path)
     if inside:
         raise SequenceError(f'{path} holds recordings, not one: name one of {", ".join(inside)}')
-    raise SequenceError(f'{path} holds no sequence: expected {_LAYOUTS}')
+    others = count_of(path, OTHER_PICTURES + PACKED)
+    there = f' but {others} (convert pictures to PNG, unpack archives)' if others else ''
+    raise SequenceError(f'{path} holds no sequence{there}: expected {_LAYOUTS}')
 
 
 def _recordings_in(path: Path) -> list[str]:
     """Return the recordings one or two folders further down, some of them."""
     inside = [child for pattern in ('*', '*/*') for child in sorted(path.glob(pattern))
-              if not is_hidden(child)]
+              if not any(is_hidden(Path(part)) for part in child.relative_to(path).parts)]
     return [str(child) for child in inside
             if is_video(child) or is_bag(child) or (child.is_dir() and (
                 (child / folders.TUM_IMAGES).is_file() or find_layout(child) is not None

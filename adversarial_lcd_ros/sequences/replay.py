@@ -10,12 +10,12 @@ the stamps of a replay; ``BagRecorder`` keeps what comes of them; ``read_payload
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 import heapq
 from pathlib import Path
 import threading
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ from adversarial_lcd_ros.sequences.stamps import frame_stamps
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+MessageT = TypeVar('MessageT')
 
 # Graphs to replay where a bag has no images; the clean ones are what came before any attack.
 GRAPH_TOPICS = ('graph_clean', 'graph')
@@ -213,6 +215,35 @@ def read_payloads(path: Path, topic: str) -> Iterator[tuple[int, bytes]]:
                                 f'{there}')
         for _, log_ns, wire in bag.messages([name]):
             yield log_ns, _payload(bag.topics[name], wire)
+
+
+def read_messages(path: Path, topic: str,
+                  decode: Callable[[bytes], MessageT]) -> list[MessageT]:
+    """
+    Return what a function makes of all payloads of a topic.
+
+    Raises
+    ------
+    SequenceError
+        As ``read_payloads``.
+    CodecError
+        The function refuses a payload; the bag and the message are named.
+
+    """
+    return list(decoded(path, topic, (payload for _, payload in read_payloads(path, topic)),
+                        decode))
+
+
+def decoded(path: Path, topic: str, payloads: Iterable[bytes],
+            decode: Callable[[bytes], MessageT]) -> Iterator[MessageT]:
+    """Yield what a function makes of payloads; its CodecError names the message, too."""
+    for number, payload in enumerate(payloads):
+        try:
+            message = decode(payload)
+        except CodecError as error:
+            where = f'bag {path}, message {number} on {topic}'
+            raise CodecError(f'{where}: {error}', cause=error.cause) from error
+        yield message
 
 
 def payload_schemas() -> dict[str, str]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import SequenceError
+from adversarial_lcd_ros.files.text import printable
 from adversarial_lcd_ros.poses.trajectory import TOLERANCE_NS, Trajectory
 from adversarial_lcd_ros.sequences.frame import Frame
 
@@ -48,11 +49,11 @@ class Coverage:
     def __str__(self) -> str:
         """Return it in words."""
         if not self.posed_frames:
-            return f'no ground truth: {self.truth or "the source has none"}'
+            return f'no ground truth: {printable(self.truth) or "the source has none"}'
         path = 'places by index' if math.isnan(self.path_m) else f'a path of {self.path_m:.2f} m'
         return (f'{self.posed_frames} of {self.frames} frames have a pose, over '
                 f'{self.posed_s:.1f} s and {path}'
-                + (f'; ground truth: {self.truth}' if self.truth else ''))
+                + (f'; ground truth: {printable(self.truth)}' if self.truth else ''))
 
 
 @dataclass(frozen=True, eq=False)

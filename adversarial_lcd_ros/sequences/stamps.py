@@ -18,6 +18,8 @@ HEADER, LOG = 'header', 'log'
 STAMPS = (HEADER, LOG)
 # What a clock that is set gains on the log times; frames that were left out do not.
 _JUMP_NS = 300_000_000_000
+# Milliseconds written as if they were microseconds: a thousandth. No recorder is so slow.
+_SLOWEST = 500
 REMEDY = f'import it with the log times of the bag, "--stamps {LOG}"'
 
 
@@ -33,12 +35,13 @@ def frame_stamps(header_ns: Sequence[int], log_ns: Sequence[int], source: Path,
     source : Path
         For errors.
     chosen : str, optional
-        'header' or 'log'. By default the headers, of which jumps of the clock are refused.
+        'header' or 'log'. By default the headers, of which jumps of the clock are refused, and
+        those that hardly move while the recorder's clock does.
 
     Raises
     ------
     SequenceError
-        There is no frame, or stamps are zero, repeat, go back, or jump.
+        There is no frame, or stamps are zero, repeat, go back, jump, or hardly move.
 
     """
     if chosen is not None and chosen not in STAMPS:
@@ -57,7 +60,19 @@ def frame_stamps(header_ns: Sequence[int], log_ns: Sequence[int], source: Path,
             f'{gap[at - 1] / 1e9:.1f} s, from {headers[at - 1]} to {headers[at]} ns, while '
             f'{(logs[at] - logs[at - 1]) / 1e9:.1f} s passed: {REMEDY}, or "--stamps {HEADER}" if '
             'the headers are right')
+    if chosen is None and len(headers):
+        _check_unit(headers, logs, source)
     try:
         return check_order(headers, source)
     except SequenceError as error:
         raise SequenceError(f'{error}: {REMEDY}' if len(headers) else str(error)) from None
+
+
+def _check_unit(headers: NDArray[np.int64], logs: NDArray[np.int64], source: Path) -> None:
+    span_ns, passed_ns = int(headers[-1] - headers[0]), int(logs[-1] - logs[0])
+    if 0 < span_ns * _SLOWEST < passed_ns:
+        raise SequenceError(
+            f'{source}: from first frame to last {span_ns / 1e9:.6f} s pass by the headers, '
+            f'and {passed_ns / 1e9:.6f} s by the log times, as where stamps in milliseconds or '
+            f'microseconds were taken for nanoseconds: {REMEDY}, or "--stamps {HEADER}" if the '
+            'headers are right')

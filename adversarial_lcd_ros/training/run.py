@@ -5,15 +5,14 @@
 From sequences with ground truth to a folder of artefacts: ``adversarial-lcd train``.
 
 Vocabulary, decisions and surrogate data belong together: ``--models FOLDER`` swaps all of them at
-once. Labels are wider than those of the evaluation (``TRAINING_LABELS``): short sequences have
-few late revisits.
+once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 import shutil
 from typing import Any
@@ -23,8 +22,8 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.attack.memory import MIN_GAP_NS
 from adversarial_lcd_ros.attack.surrogate_data import SurrogateData
-from adversarial_lcd_ros.config import AttackConfig, BuilderConfig, LabelConfig, LcdConfig
-from adversarial_lcd_ros.errors import ConfigError, EvaluationError
+from adversarial_lcd_ros.config import AttackConfig, BuilderConfig
+from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.files.writing import write_json
 from adversarial_lcd_ros.lcd.targets import needed_variant
 from adversarial_lcd_ros.paths import SURROGATE_DATA, VOCABULARY
@@ -46,6 +45,7 @@ from adversarial_lcd_ros.training.model_folder import (
 )
 from adversarial_lcd_ros.training.networks import make_trainer, reused_network
 from adversarial_lcd_ros.training.operating_points import meet_loops, with_operating_points
+from adversarial_lcd_ros.training.plan import TrainingPlan
 from adversarial_lcd_ros.training.sources import (
     TrainingFrames,
     one_licence_each,
@@ -56,78 +56,10 @@ from adversarial_lcd_ros.vision.features import FeatureExtractor, to_grey
 from adversarial_lcd_ros.vision.vocabulary import Vocabulary, train_vocabulary
 
 FORMAT = 'adversarial_lcd_ros/model_card/1'
-# By exact co-visibility, or what else shows it, as those of an evaluation; but revisits within a
-# few seconds count, too, which short sequences are full of. The overlap is for the check before
-# the work, and for training by poses alone: wider, so that glancing revisits are seen.
-TRAINING_LABELS = LabelConfig(rule='auto', min_gap_s=3.0, positive_overlap=0.45)
 # Flips off a random walk are more varied than those of one ranking: a better sample to learn of.
 SURROGATE_PERTURBATION = 'random_walk'
 
-
-def default_targets() -> tuple[str, ...]:
-    """Return what is trained unless others are asked for: all that need only this package."""
-    return tuple(name for name in TARGETS if not TARGETS.find(name).trainer)
-
-
 Stage = Callable[[str], AbstractContextManager[Progress]]
-
-
-@dataclass(frozen=True)
-class TrainingPlan:
-    """
-    What is trained, and on how much.
-
-    Attributes
-    ----------
-    builder : BuilderConfig
-        Of the graphs; a vocabulary named here is used instead of a new one.
-    lcd : LcdConfig
-        Its map window is that of the decisions; the detector that the surrogate data are
-        queried from has the rest of its settings too.
-    labels : LabelConfig
-        What counts as a loop.
-    targets : tuple of str
-        Targets to train; the first one answers the queries of the surrogate data.
-    pairs : int
-        Most loops, and most random pairs of different places, of a sequence.
-    vocabulary_stride : int
-        Every how many frames one is used for the vocabulary.
-    branching, depth : int
-        Shape of the vocabulary: branching^depth words.
-    flips_per_frame : int
-        Flips queried on each frame of the first sequence; 0: no surrogate data.
-    networks : Path, optional
-        Folder of an earlier training whose networks are used instead of new ones.
-
-    Raises
-    ------
-    ConfigError
-        A target is unknown or named twice, or a number is out of range.
-
-    """
-
-    builder: BuilderConfig = field(default_factory=BuilderConfig)
-    lcd: LcdConfig = field(default_factory=LcdConfig)
-    labels: LabelConfig = TRAINING_LABELS
-    targets: tuple[str, ...] = field(default_factory=default_targets)
-    pairs: int = 600
-    vocabulary_stride: int = 2
-    branching: int = 16
-    depth: int = 3
-    flips_per_frame: int = 8
-    networks: Path | None = None
-
-    def __post_init__(self) -> None:
-        """Check names and ranges."""
-        for target in self.targets:
-            TARGETS.check(target)
-        if not self.targets or len(set(self.targets)) != len(self.targets):
-            raise ConfigError(f'targets {", ".join(self.targets) or "(none)"}: expected some of '
-                              f'{TARGETS}, each once')
-        for name, low in (('pairs', 1), ('vocabulary_stride', 1), ('branching', 2), ('depth', 1),
-                          ('flips_per_frame', 0)):
-            if getattr(self, name) < low:
-                raise ConfigError(f'{name} = {getattr(self, name)}: expected {low} or more')
 
 
 @contextmanager

@@ -27,6 +27,8 @@ NMS_IOU = 0.45
 LETTERBOX_GREY = 114
 # Boxes that suppression looks at, the most confident first: its time grows with their square.
 _MOST_BOXES = 4096
+# Of the network's input, pixels: no object network is so large, and memory is not endless.
+_LONGEST_SIDE = 8192
 _MOST_VALUES = 1 << 26
 _EXPECTED = ('expected a PaddleDetection export (image, scale_factor) or one of YOLOv8 or later '
              'for detection, in float32 (of YOLOv5 to 7: export it with suppression inside, rows '
@@ -212,7 +214,8 @@ class ObjectDetector:
                 sides = None
         if len(shape) != 4 or shape[1] != 3 or not _are_sides(sides):
             raise ModelError(f'{self._model}: the input has shape {shape}; expected (batch, 3, '
-                             'height, width): export the model with a fixed size')
+                             f'height, width) of at most {_LONGEST_SIDE}: export the model '
+                             'with a fixed size')
         return int(sides[1]), int(sides[0])
 
     def _infer(self, feed: dict[str, NDArray[np.float32]],
@@ -296,4 +299,4 @@ class ObjectDetector:
 
 def _are_sides(sides: Any) -> bool:
     return isinstance(sides, list) and len(sides) == 2 and all(
-        isinstance(side, int) and side > 0 for side in sides)
+        type(side) is int and 0 < side <= _LONGEST_SIDE for side in sides)

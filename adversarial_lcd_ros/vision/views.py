@@ -16,7 +16,7 @@ from adversarial_lcd_ros.errors import GraphError
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.sequences.frame import JPEG, Frame
-from adversarial_lcd_ros.vision.draw import draw_decision
+from adversarial_lcd_ros.vision.panels import draw_decision
 
 # Pictures of earlier frames that a later one may be matched with; the oldest go first.
 _MOST_BYTES = 256 << 20

@@ -14,6 +14,8 @@ from adversarial_lcd_ros.graph import FEATURE_TIER, MultiTierGraph
 from adversarial_lcd_ros.weisfeiler_lehman import flips
 from adversarial_lcd_ros.weisfeiler_lehman.pooled_flips import ITERATIONS, pooled_changes
 
+# Sums of squares of larger numbers may overflow float32.
+_LARGE = 1e15
 NODE_FEATURES = ('is_object', 'x', 'y', 'log_size', 'score', 'log_degree')
 
 
@@ -29,8 +31,10 @@ def node_features(graph: MultiTierGraph) -> NDArray[np.float64]:
     score = np.zeros(graph.node_count)
     for tier in (is_feature, ~is_feature):
         if tier.any():
-            spread = graph.score[tier].std()
-            score[tier] = (graph.score[tier] - graph.score[tier].mean()) / (spread or 1.0)
+            values = graph.score[tier]
+            if np.abs(values).max() > _LARGE:
+                values = values.astype(np.float64)
+            score[tier] = (values - values.mean()) / (values.std() or 1.0)
     degree = np.bincount(graph.edge.ravel(), minlength=graph.node_count)
     size = graph.size.max(axis=1) / graph.diagonal
     return np.stack([~is_feature,

@@ -4,6 +4,9 @@
 """
 A poster in the scene: the same simple, highly textured patch in two places (Ikram et al.).
 
+Two sheets hang in opposite corners of one square of half the frame: who knows that a check asks
+how much of the frame agrees makes more of it agree with no more paper.
+
 Whoever hangs it needs no access to any message. What is pasted is lit, blurred and noisy, each
 time otherwise, and seen in perspective; it is a stand-in for a printed sheet, and no print was
 photographed.
@@ -12,6 +15,7 @@ photographed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -24,6 +28,10 @@ SIDE_PX, CELLS, SQUARES = 480, 24, 8
 # Of the side: how far corners stray from a frontal view, from all sides and between frames.
 JITTER, SWAY = 0.10, 0.02
 GAIN, OFFSET, BLUR_PX, NOISE = (0.75, 1.15), (-15.0, 15.0), (0.3, 1.0), (2.0, 6.0)
+# Of the frame: the square in which two sheets hang. Above half of that they overlap.
+TWO_SPAN = 0.5
+_SECOND_SEED = 500_009
+_UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
 _SHIFT = 4
 
 
@@ -65,20 +73,66 @@ class Poster:
     kind : str
         See ``make_texture``.
     share : float
-        Of the frame, that it covers.
+        Of the frame, that it covers, all sheets together.
     seed : int
         Of texture, place and light.
+    sheets : int
+        1, or 2 with a texture each.
+
+    Raises
+    ------
+    ConfigError
+        Two sheets of that share would overlap.
 
     """
 
     kind: str
     share: float
     seed: int
+    sheets: int = 1
+
+    def __post_init__(self) -> None:
+        if self.sheets > 1 and self.share > TWO_SPAN / 2:
+            raise ConfigError(f'two sheets over {self.share:g} of the frame overlap: expected a '
+                              f'share of at most {TWO_SPAN / 2:g}')
+
+    @cached_property
+    def textures(self) -> list[NDArray[np.uint8]]:
+        """The pixels of each sheet."""
+        return [make_texture(self.kind, self.seed + number * _SECOND_SEED)
+                for number in range(self.sheets)]
 
     @property
-    def texture(self) -> NDArray[np.uint8]:
-        """The pixels."""
-        return make_texture(self.kind, self.seed)
+    def span(self) -> float:
+        """Share of the frame of the square that it hangs in."""
+        return self.share if self.sheets == 1 else TWO_SPAN
+
+    def hang(self, image: NDArray[np.uint8], square: NDArray[np.float64],
+             rng: np.random.Generator) -> NDArray[np.uint8]:
+        """
+        Return a copy of a picture with every sheet in it.
+
+        Parameters
+        ----------
+        image : uint8, (h, w, 3) or (h, w)
+        square : float64, (4, 2)
+            Corners of what it hangs in, pixels; see ``paste``.
+        rng : Generator
+            Of the light.
+
+        """
+        for number, texture in enumerate(self.textures):
+            image = paste(image, texture, self._corners(square, number), rng)
+        return image
+
+    def _corners(self, square: NDArray[np.float64], number: int) -> NDArray[np.float64]:
+        """Return the corners of a sheet, (4, 2)."""
+        if self.sheets == 1:
+            return square
+        side = np.sqrt(self.share / self.sheets / TWO_SPAN)
+        matrix = cv2.getPerspectiveTransform(_UNIT, square.astype(np.float32))
+        own = (side * _UNIT + number * (1 - side)).astype(np.float32)
+        return np.asarray(cv2.perspectiveTransform(own[None], matrix)[0], np.float64)
 
 
 def frontal_corners(width: int, height: int, share: float, rng: np.random.Generator
@@ -92,8 +146,7 @@ def frontal_corners(width: int, height: int, share: float, rng: np.random.Genera
     side = min(np.sqrt(share * width * height), min(width, height) / (1 + 2 * JITTER))
     room = np.array([width, height]) - side * (1 + 2 * JITTER)
     corner = JITTER * side + rng.random(2) * room
-    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
-    return np.asarray(corner + side * (square + JITTER * rng.uniform(-1, 1, (4, 2))))
+    return np.asarray(corner + side * (_UNIT + JITTER * rng.uniform(-1, 1, (4, 2))))
 
 
 def paste(image: NDArray[np.uint8], texture: NDArray[np.uint8], corners: NDArray[np.float64],

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.images.poster import Poster, frontal_corners, paste, swayed
+from adversarial_lcd_ros.attack.images.poster import Poster, frontal_corners, swayed
 from adversarial_lcd_ros.config import ReplayConfig
 from adversarial_lcd_ros.errors import CodecError, ConfigError, SequenceError
 from adversarial_lcd_ros.messages.codec import typestore
@@ -22,7 +22,7 @@ from adversarial_lcd_ros.sequences.frame import PNG, Frame, decode
 
 class Posting:
     """
-    Pastes the same poster into the frames of some spans of time.
+    Pastes the same poster, of one sheet or two, into the frames of some spans of time.
 
     It hangs in one place of the frame for the whole of a span, but for a sway; light is another
     in each frame. The same seed and stamps give the same pixels. Changed frames are PNG, or raw
@@ -37,19 +37,19 @@ class Posting:
     Raises
     ------
     ConfigError
-        The spans are not of the form FROM:TO, ..., or there is a poster without any.
+        The spans are not of the form FROM:TO, ..., or there is a poster without any, or of two
+        sheets that overlap.
 
     """
 
     def __init__(self, config: ReplayConfig, first_ns: int) -> None:
-        self._poster = Poster(config.poster, config.poster_share, config.poster_seed)
+        self._poster = Poster(config.poster, config.poster_share, config.poster_seed,
+                              config.poster_sheets)
         self._spans = [(first_ns + round(start * 1e9), first_ns + round(stop * 1e9))
                        for start, stop in spans_in(config.poster_spans)]
-        if config.poster != NONE:
-            if not self._spans:
-                raise ConfigError('poster without poster_spans: say when it is seen, in seconds '
-                                  'of the bag, such as "10:12, 60:62"')
-            self._texture = self._poster.texture
+        if config.poster != NONE and not self._spans:
+            raise ConfigError('poster without poster_spans: say when it is seen, in seconds '
+                              'of the bag, such as "10:12, 60:62"')
 
     def on_pixels(self, pixels: NDArray[np.uint8], stamp_ns: int) -> NDArray[np.uint8]:
         """Return a frame's pixels, (h, w, 3) BGR or (h, w), as they leave the scene."""
@@ -58,10 +58,10 @@ class Posting:
             return pixels
         height, width = pixels.shape[:2]
         seed = self._poster.seed
-        corners = frontal_corners(width, height, self._poster.share,
-                                  np.random.default_rng((seed, span)))
+        square = frontal_corners(width, height, self._poster.span,
+                                 np.random.default_rng((seed, span)))
         rng = np.random.default_rng((seed, stamp_ns))
-        return paste(pixels, self._texture, swayed(corners, rng), rng)
+        return self._poster.hang(pixels, swayed(square, rng), rng)
 
     def on_message(self, message_type: str, stamp_ns: int, wire: bytes) -> bytes:
         """Return the CDR of a frame as it leaves the scene; raises SequenceError."""

@@ -44,6 +44,7 @@ class MoveNodes(Search):
     colour: ClassVar[str] = '#7d3c98'
     own_settings: ClassVar[tuple[str, ...]] = ('nodes_moved', 'moved')
     query_share: ClassVar[float] = 0.01
+    changes_nodes: ClassVar[bool] = True
 
     def __init__(self, config: AttackConfig) -> None:
         super().__init__(config)

@@ -37,6 +37,7 @@ class Replay(Search):
     rank: ClassVar[int] = 120
     colour: ClassVar[str] = '#b9770e'
     query_share: ClassVar[float] = 0.01
+    changes_nodes: ClassVar[bool] = True
 
     def __init__(self, config: AttackConfig) -> None:
         super().__init__(config)

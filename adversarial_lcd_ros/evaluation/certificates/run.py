@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.environment import code_digest
-from adversarial_lcd_ros.evaluation.digests import file_digest
+from adversarial_lcd_ros.evaluation.digests import model_digests
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
 from adversarial_lcd_ros.files.digests import digest_of
@@ -65,11 +65,9 @@ class CertificateTask:
     @property
     def key(self) -> str:
         """Digest of all that the certificates depend on, hexadecimal."""
-        model = decision_path(self.lcd.model, self.lcd.target)
         values = {'schema': SCHEMA, 'code': code_digest(*_CODE), 'stream': self.stream.digest,
                   'detector': asdict(self.lcd), 'budget': self.budget, 'frames': self.frames,
-                  'models': [file_digest(path) for path in (model, model.with_suffix('.onnx'))
-                             if path.exists()]}
+                  'models': model_digests(decision_path(self.lcd.model, self.lcd.target))}
         return digest_of(json.dumps(values, sort_keys=True).encode())
 
 

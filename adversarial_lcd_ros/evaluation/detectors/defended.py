@@ -11,7 +11,7 @@ import numpy as np
 
 from adversarial_lcd_ros.evaluation import intervals, wording
 from adversarial_lcd_ros.evaluation.markdown import table
-from adversarial_lcd_ros.evaluation.metrics import Outcomes, right, told_kind
+from adversarial_lcd_ros.evaluation.outcomes import Outcomes, right, told_kind
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 from adversarial_lcd_ros.registry import NONE

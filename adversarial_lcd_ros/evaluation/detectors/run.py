@@ -22,15 +22,9 @@ from numpy.typing import NDArray
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.environment import code_digest
 from adversarial_lcd_ros.evaluation import intervals
-from adversarial_lcd_ros.evaluation.digests import file_digest
-from adversarial_lcd_ros.evaluation.metrics import (
-    Metrics,
-    first_closure_latency_s,
-    measure,
-    outcomes,
-    right,
-    told_kind,
-)
+from adversarial_lcd_ros.evaluation.digests import model_digests
+from adversarial_lcd_ros.evaluation.metrics import Metrics, first_closure_latency_s, measure
+from adversarial_lcd_ros.evaluation.outcomes import outcomes, right, told_kind
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
@@ -54,7 +48,7 @@ from adversarial_lcd_ros.training.pair_scores import LabelledPairs, PairScorer
 # Of the row's columns; a change in the code below makes rows again by itself.
 KIND, SCHEMA = 'targets', 5
 _CODE = ('lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled', 'messages',
-         'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics',
+         'ground_truth/pairs', 'training/pair_scores', 'evaluation/metrics', 'evaluation/outcomes',
          'evaluation/intervals', 'evaluation/replay/offline', 'evaluation/detectors/run')
 PROTOCOLS = ('pairs', 'live')
 
@@ -108,9 +102,7 @@ class TargetTask:
         values = {'schema': SCHEMA, 'code': code_digest(*_CODE),
                   'stream': self.stream.digest, 'protocol': self.protocol,
                   'detector': {**asdict(self.lcd), 'target': self.target},
-                  'models': [file_digest(path) for path in
-                             (self.model, self.model.with_suffix('.onnx')) if path.exists()],
-                  'seeds': self.seeds,
+                  'models': model_digests(self.model), 'seeds': self.seeds,
                   'scored': self.scored, 'labels': asdict(self.label_config)}
         if self.protocol == 'pairs':
             # The stream's digest is of what a replay needs, and knows nothing of pairs.

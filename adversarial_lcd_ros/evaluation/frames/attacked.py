@@ -6,7 +6,7 @@ Attacks on single frames of a stream: the protocol of the paper's experiments.
 
 The stream is walked in order. The detector remembers every clean graph and the attacker sees
 each go by, but only a sample of the frames is attacked and judged, each against the map of clean
-graphs before it. In a live run (``live``, ``offline``) every frame is attacked and the map
+graphs before it. In a replay (``evaluation.replay``) every frame is attacked and the map
 consists of attacked graphs; here frames do not hang on each other, and attacks with a thousand
 queries a frame can be compared over many seeds. By pairs a sampled frame is judged against one
 given reference and its window instead (``pairs``); all else is the same.
@@ -16,7 +16,7 @@ The sample hangs on seed and sequence only: all attacks meet the same frames.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 import time
 from typing import Protocol
@@ -30,7 +30,6 @@ from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
 from adversarial_lcd_ros.evaluation.frames.optimum import Optimum
-from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector
 from adversarial_lcd_ros.evaluation.frames.samples import FrameSample
 from adversarial_lcd_ros.evaluation.frames.sealed import SealedWire
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -160,8 +159,7 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
 
     """
     detectors: dict[LcdConfig, LoopClosureDetector] = {}
-    kind_of_detector = LoopClosureDetector if sample.reference is None else PairDetector
-    contests = [_contest(cell, lcd, seed, detectors, kind_of_detector) for cell in cells]
+    contests = [_contest(cell, lcd, seed, detectors, sample.make_detector) for cell in cells]
     wire = SealedWire() if any(cell.sealed for cell in cells) else None
     for cell, contest in zip(cells, contests, strict=True):
         contest.wire = wire if cell.sealed else None
@@ -170,7 +168,7 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     for index, graph in enumerate(graphs[:max(place, default=-1) + 1]):
         if index in place:
             row = place[index]
-            _hold_against(sample, row, detectors.values())
+            sample.hold_against(row, detectors.values())
             # What flips leave alone is computed here, at the cost of no cell.
             clean = {config: detector.judge(graph) for config, detector in detectors.items()}
             for contest in contests:
@@ -186,16 +184,9 @@ def attack_frames(graphs: Sequence[MultiTierGraph], sample: FrameSample, cells: 
     return [contest.results for contest in contests]
 
 
-def _hold_against(sample: FrameSample, row: int,
-                  detectors: Iterable[LoopClosureDetector]) -> None:
-    for detector in detectors:
-        if sample.reference is not None and isinstance(detector, PairDetector):
-            detector.reference = int(sample.reference[row])
-
-
 def _contest(cell: Cell, lcd: LcdConfig, seed: int,
              detectors: dict[LcdConfig, LoopClosureDetector],
-             make: type[LoopClosureDetector]) -> _Contest:
+             make: Callable[[LcdConfig], LoopClosureDetector]) -> _Contest:
     behind = detector_of(lcd, cell)
     known = behind if cell.aware else replace(lcd, threshold=cell.threshold)
     configs = (replace(behind, target=cell.target, hard_answers=False),

@@ -31,7 +31,7 @@ from adversarial_lcd_ros.registry import SEARCHES, YARDSTICKS
 SCHEMA = 7
 # What makes the figures of a row.
 _CODE = ('attack', 'lcd', 'graph', 'edge_rule', 'weisfeiler_lehman', 'keyframes', 'compiled',
-         'messages', 'evaluation/metrics', 'evaluation/frames/attacked',
+         'messages', 'evaluation/metrics', 'evaluation/outcomes', 'evaluation/frames/attacked',
          'evaluation/frames/optimum', 'evaluation/frames/pairs', 'evaluation/frames/rows',
          'evaluation/frames/samples', 'evaluation/frames/sealed')
 ORACLES = ('soft', 'hard')

@@ -19,7 +19,7 @@ from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult, attack_f
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES
 from adversarial_lcd_ros.evaluation.methods import is_yardstick
-from adversarial_lcd_ros.evaluation.metrics import EFFECTS
+from adversarial_lcd_ros.evaluation.outcomes import EFFECTS
 from adversarial_lcd_ros.evaluation.pictures import Picture
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
@@ -27,7 +27,7 @@ from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
-from adversarial_lcd_ros.vision.draw import draw_attack
+from adversarial_lcd_ros.vision.panels import draw_attack
 
 PICTURES = 6
 _BLANK_GREY = 235

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.frames.attacked import FrameResult
 from adversarial_lcd_ros.evaluation.frames.cells import Cell
+from adversarial_lcd_ros.evaluation.metrics import balanced_accuracy, effect
+from adversarial_lcd_ros.evaluation.outcomes import UNTOLD_MATCH, Outcomes, outcomes, right
 from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE, RIGHT, UNTOLD
 
 _TRACE_POINTS = 8
@@ -56,7 +57,7 @@ def make_row(cell: Cell, seed: int, sequence: str,
     kind = np.array([result.kind for result in results], np.int8)
     before = _outcomes(kind, results, 'clean')
     after = _outcomes(kind, results, 'attacked')
-    change = metrics.effect(kind, before, after)
+    change = effect(kind, before, after)
     turned = [result.clean.is_loop != result.attacked.is_loop for result in results]
     attacks = [result.result for result in results]
     seconds = {name: sum(getattr(result, name) for result in results)
@@ -68,8 +69,8 @@ def make_row(cell: Cell, seed: int, sequence: str,
         'frames': len(results), 'positives': int((kind == POSITIVE).sum()),
         'negatives': int((kind == NEGATIVE).sum()),
         'accuracy_clean': _accuracy(before), 'accuracy_attacked': _accuracy(after),
-        'balanced_clean': metrics.balanced_accuracy(kind, before),
-        'balanced_attacked': metrics.balanced_accuracy(kind, after),
+        'balanced_clean': balanced_accuracy(kind, before),
+        'balanced_attacked': balanced_accuracy(kind, after),
         'decline_pp': change.decline_pp, 'suppressed': change.suppressed,
         'invented': change.invented, 'left_out': change.left_out,
         'invented_elsewhere': sum(
@@ -95,15 +96,15 @@ def are_frames(results: Sequence[Any]) -> bool:
 
 
 def _outcomes(kind: NDArray[np.int8], results: Sequence[FrameResult],
-              which: str) -> metrics.Outcomes:
-    return metrics.outcomes(
+              which: str) -> Outcomes:
+    return outcomes(
         kind, np.array([getattr(result, which).is_loop for result in results], bool),
         np.array([getattr(result, f'{which}_is') == RIGHT for result in results], bool),
         np.array([getattr(result, f'{which}_is') != UNTOLD for result in results], bool))
 
 
-def _accuracy(outcome: metrics.Outcomes) -> float | None:
-    return _mean(metrics.right(outcome[outcome != metrics.UNTOLD_MATCH]))
+def _accuracy(outcome: Outcomes) -> float | None:
+    return _mean(right(outcome[outcome != UNTOLD_MATCH]))
 
 
 def _mean(values: Sequence[float] | NDArray[Any]) -> float | None:

@@ -4,11 +4,11 @@
 """
 Experiments: the cells of a recipe on several sequences with many seeds, side by side, resumable.
 
-A task is some cells of one sequence and seed, walked together (``frames``). Tasks know nothing of
-each other; finished rows go to cells.jsonl at once, and what is there is not run again.
+A task is some cells of one sequence and seed, walked together (``attacked``). Tasks know nothing
+of each other; finished rows go to cells.jsonl at once, and what is there is not run again.
 
-Tasks take about 15 s each and go seed by seed: broken off, a sweep is a whole table with fewer
-seeds.
+Tasks take about 15 s each and go seed by seed: broken off, an experiment is a whole table with
+fewer seeds.
 """
 
 from __future__ import annotations

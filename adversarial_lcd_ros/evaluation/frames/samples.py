@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.frames.pairs import draw_pairs
+from adversarial_lcd_ros.config import LcdConfig
+from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector, draw_pairs
 from adversarial_lcd_ros.ground_truth.labels import (
     ELSEWHERE,
     NEGATIVE,
@@ -20,6 +21,7 @@ from adversarial_lcd_ros.ground_truth.labels import (
     UNTOLD,
     FrameLabels,
 )
+from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 
 _DRAW = 20_210  # of the one drawing that all seeds share
 
@@ -49,6 +51,16 @@ class FrameSample:
     match_is: NDArray[np.str_]
     told_by: str = ''
     reference: NDArray[np.int64] | None = None
+
+    def make_detector(self, config: LcdConfig) -> LoopClosureDetector:
+        """Return a detector that judges as the sample asks: against the map, or by pairs."""
+        return (LoopClosureDetector if self.reference is None else PairDetector)(config)
+
+    def hold_against(self, row: int, detectors: Iterable[LoopClosureDetector]) -> None:
+        """By pairs, give detectors the reference of a frame of the sample."""
+        for detector in detectors:
+            if self.reference is not None and isinstance(detector, PairDetector):
+                detector.reference = int(self.reference[row])
 
 
 def sample_frames(labels: FrameLabels, per_kind: int, seed: int) -> FrameSample:

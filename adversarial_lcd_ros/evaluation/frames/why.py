@@ -22,7 +22,6 @@ from adversarial_lcd_ros.attack.attacker import Attacker
 from adversarial_lcd_ros.attack.oracle import edit_budget
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
 from adversarial_lcd_ros.evaluation.frames.cells import Cell, detector_of
-from adversarial_lcd_ros.evaluation.frames.pairs import PairDetector
 from adversarial_lcd_ros.evaluation.frames.run import FIRST_SEED
 from adversarial_lcd_ros.evaluation.frames.samples import SAMPLES
 from adversarial_lcd_ros.evaluation.store import Row
@@ -173,17 +172,15 @@ def _in_stream(here: Mapping[str, Stream], cells: Mapping[str, Cell], judged: st
     stream = next(iter(here.values()))
     sample = SAMPLES[judged](stream.labels, _LOOPS, FIRST_SEED)
     graphs = {target: load_stream_graphs(of.graphs) for target, of in here.items()}
-    make = LoopClosureDetector if sample.reference is None else PairDetector
-    detectors = {target: make(replace(detector_of(lcd, cell), target=target, hard_answers=False))
+    detectors = {target: sample.make_detector(replace(detector_of(lcd, cell), target=target,
+                                                      hard_answers=False))
                  for target, cell in cells.items()}
     ratio = max(cell.attack.ratio for cell in cells.values())
     place = {int(frame): row for row, frame in enumerate(sample.frame)
              if sample.kind[row] == POSITIVE}
     for index in range(max(place, default=-1) + 1):
         if index in place:
-            for detector in detectors.values():
-                if isinstance(detector, PairDetector) and sample.reference is not None:
-                    detector.reference = int(sample.reference[place[index]])
+            sample.hold_against(place[index], detectors.values())
             if all(detector.judge(graphs[target][index]).is_loop
                    for target, detector in detectors.items()):
                 found = tuple(_sensitivity(target, detector, graphs[target][:index + 1], ratio)

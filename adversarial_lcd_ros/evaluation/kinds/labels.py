@@ -11,7 +11,7 @@ from typing import Any
 from adversarial_lcd_ros.evaluation.kinds.base import Figure, FigureTable, Results, ResultsKind
 from adversarial_lcd_ros.evaluation.labels.page import render_page
 from adversarial_lcd_ros.evaluation.labels.run import KIND, SCHEMA
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS
 
 _PAIRS = ('loop_pairs', 'right_pairs', 'scaled_pairs', 'wrong_pairs')
 

@@ -17,11 +17,12 @@ from matplotlib.figure import Figure
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template
+from adversarial_lcd_ros.evaluation.page import STYLE, WIDE, data_uri, load_template, svg
 from adversarial_lcd_ros.evaluation.results import REPORT
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.files.writing import write_bytes, write_text
 from adversarial_lcd_ros.ground_truth.labels import FrameLabels
+from adversarial_lcd_ros.poses.trajectory import nearest_in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,9 +34,12 @@ LEGEND = (
     ('positive', '#2e8064', 'a loop is there to be found'),
     ('negative', '#c0392b', 'a new place: shares nothing with any older view'),
     ('scale', '#7a4a9c', 'seen before from nearer or further only: a change of scale, not scored'),
-    ('between', '#b9bec6', 'cannot be told, or shares too little: not scored'),
-    ('no_candidate', '#dddfe3', 'too early: no frame is old enough'),
+    ('between', '#9c6400', 'cannot be told, or shares too little: not scored'),
+    ('no_candidate', '#a9afb8', 'too early: no frame is old enough'),
     ('no_ground_truth', '#000000', 'no ground truth pose'))
+# Not by colour alone: green and red are one to many readers.
+_MARKERS = {'positive': 'o', 'negative': 'x', 'scale': 's', 'between': 'D', 'no_candidate': '.',
+            'no_ground_truth': '+'}
 PATH, RULE = 'path.svg', 'labels.png'
 _HEIGHT, _GAP, _JPEG_QUALITY = 240, 6, 80
 
@@ -86,24 +90,22 @@ def draw_path(labels: FrameLabels, trajectory: Trajectory) -> bytes:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 5.0), layout='constrained')
         _plot_path(figure.subplots(), labels, trajectory)
-        stream = io.BytesIO()
-        figure.savefig(stream, format='svg', metadata={'Date': None})
-    return stream.getvalue()
+        return svg(figure)
 
 
 def _plot_path(axes: Axes, labels: FrameLabels, trajectory: Trajectory) -> None:
-    row = np.searchsorted(trajectory.stamp_ns, labels.stamp_ns)
-    place = trajectory.position[np.minimum(row, len(trajectory) - 1)]
+    place = trajectory.position[nearest_in_time(trajectory.stamp_ns, labels.stamp_ns)]
     across, up = np.sort(np.argsort(np.ptp(place, axis=0))[-2:])
     names = np.array(labels.names)
     axes.plot(place[:, across], place[:, up], color='#dddfe3', linewidth=0.8, zorder=0)
     for kind, colour, _ in reversed(LEGEND):
         chosen = names == kind
         if chosen.any():
-            axes.scatter(place[chosen, across], place[chosen, up], s=9, color=colour,
-                         label=f'{kind} ({int(chosen.sum())})')
+            axes.scatter(place[chosen, across], place[chosen, up], s=12, color=colour,
+                         marker=_MARKERS[kind], linewidth=1.0,
+                         label=f'{kind.replace("_", " ")} ({int(chosen.sum())})')
     axes.set(xlabel=f'{"xyz"[across]}, metres', ylabel=f'{"xyz"[up]}, metres', aspect='equal')
-    axes.legend(loc='best')
+    axes.figure.legend(loc='outside upper left', ncols=3, fontsize=8.0, reverse=True)
 
 
 def draw_rule(labels: FrameLabels, trajectory: Trajectory,

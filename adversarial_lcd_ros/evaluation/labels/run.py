@@ -12,17 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation.labels.check import check_labels
 from adversarial_lcd_ros.evaluation.labels.page import PicturePair, write_page
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS
-from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS
+from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
 from adversarial_lcd_ros.graph_sequences.opening import holds_graphs, open_graphs
 from adversarial_lcd_ros.ground_truth.labelling import Labelled, Views, label_views
 from adversarial_lcd_ros.ground_truth.labels import POSITIVE, FrameLabels
+from adversarial_lcd_ros.poses.trajectory import Trajectory, nearest_in_time
 from adversarial_lcd_ros.sequences import Sequence as CameraSequence
 from adversarial_lcd_ros.sequences import open_sequence
 from adversarial_lcd_ros.sequences.part import SequencePart
@@ -71,7 +71,7 @@ def open_views(source: str) -> Opened:
     return Opened(sequence.name, views, None if sequence.detections else sequence)
 
 
-def _known(trajectory: Any, source: str, reason: str) -> Any:
+def _known(trajectory: Trajectory | None, source: str, reason: str) -> Trajectory:
     if trajectory is None:
         raise EvaluationError(f'{source}: {reason}; by it loops are known: name it with '
                               '--ground-truth, or go on without labels: "adversarial-lcd '
@@ -105,15 +105,14 @@ def write_labels(source: str, output: Path, config: LabelConfig, *, check: bool 
     row = {'sequence': opened.name, **_counts(found)}
     if check:
         row['check'] = check_labels(opened.views, config, progress)
-    summary = {'kind': KIND, 'schema': SCHEMA, 'rows': [row]}
+    summary = summary_document(KIND, SCHEMA, [row])
     output.mkdir(parents=True, exist_ok=True)
     folder = ResultsFolder(output)
     folder.write_setup([config], command_line, 0)
     folder.write_json(SUMMARY, summary)
-    pairs = pairs_to_look_at(found.labels, opened.views.trajectory.position,
-                             opened.views.trajectory.stamp_ns)
-    write_page(output, row, found.labels, opened.views.trajectory,
-               _pictures(opened, pairs))
+    trajectory = opened.views.trajectory
+    write_page(output, row, found.labels, trajectory,
+               _pictures(opened, pairs_to_look_at(found.labels, trajectory)))
     return summary
 
 
@@ -131,16 +130,15 @@ def _counts(found: Labelled) -> dict[str, Any]:
             'wrong_pairs': int((labels.elsewhere & old).sum())}
 
 
-def pairs_to_look_at(labels: FrameLabels, position: NDArray[np.float64],
-                     stamp_ns: NDArray[np.int64]) -> list[tuple[str, int, int]]:
+def pairs_to_look_at(labels: FrameLabels,
+                     trajectory: Trajectory) -> list[tuple[str, int, int]]:
     """
     Return pairs (kind, frame, older frame) worth a look, spread over time.
 
     A frame is shown with a frame that it makes a loop with, or with the furthest one of a change
     of scale; any other with the older one that was taken nearest to it.
     """
-    row = np.minimum(np.searchsorted(stamp_ns, labels.stamp_ns), len(stamp_ns) - 1)
-    place = position[row]
+    place = trajectory.position[nearest_in_time(trajectory.stamp_ns, labels.stamp_ns)]
     names = np.array(labels.names)
     chosen = []
     for kind in FRAME_KINDS[:_LOOKED_AT]:

@@ -188,7 +188,7 @@ def draw_errors(shown: Sequence[Shown], time_s: NDArray[np.float64], width: floa
             panel.set_yscale('log')
             panel.grid(color=GRID, linewidth=0.6)
         for panel in panels[::2]:
-            panel.set_ylabel('off, metres')
+            panel.set_ylabel('error, metres')
         figure.supxlabel('time in the sequence, seconds', fontsize=9.0)
     return figure
 

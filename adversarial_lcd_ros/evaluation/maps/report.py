@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import io
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,12 @@ from adversarial_lcd_ros.evaluation.maps.plots import CHECKED_COLOUR, Shown, col
 from adversarial_lcd_ros.evaluation.maps.summary import KIND, SCHEMA
 from adversarial_lcd_ros.evaluation.maps.tables import (
     all_tables,
+    count,
     is_main,
     markdown,
-    metres,
     run_title,
     stage_title,
+    with_interval,
 )
 from adversarial_lcd_ros.evaluation.page import NARROW, STYLE, WIDE, data_uri, load_template, svg
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN
@@ -69,7 +70,8 @@ def report_maps(folder: Path) -> Path:
 
     """
     page = load_template('map.html.j2').render(
-        summary=read_json(folder / SUMMARY), section=render_section(folder),
+        summary=read_json(folder / SUMMARY), section=render_section(folder, alone=True),
+        headline=headline(read_json(folder / SUMMARY)),
         configuration=read_json(folder / CONFIGURATION),
         environment=read_json(folder / ENVIRONMENT))
     write_text(folder / REPORT, page)
@@ -77,13 +79,13 @@ def report_maps(folder: Path) -> Path:
     return folder / REPORT
 
 
-def render_section(folder: Path) -> str:
-    """Return the section on the maps in a folder, as HTML."""
+def render_section(folder: Path, alone: bool = False) -> str:
+    """Return the section on the maps in a folder, as HTML; alone on its page, or in a report."""
     summary = _summary(folder)
     try:
         stages = [_stage(folder, summary, stage) for stage in (YOUNG, WHOLE)]
         values = {'summary': summary, 'stages': [stage for stage in stages if stage],
-                  'tables': all_tables(summary), 'headline': headline(summary),
+                  'tables': all_tables(summary), 'headline': headline(summary), 'alone': alone,
                   'untold': _untold(summary)}
     except (LookupError, TypeError, ValueError) as error:
         raise EvaluationError(f'{folder} holds no whole maps ({type(error).__name__}: {error}): '
@@ -197,12 +199,17 @@ def headline(summary: Mapping[str, Any]) -> str:
         return ''
     main = [row for row in summary['rows'] if is_main(row) and not row['checked']
             and row['setting'] == worst['setting']]
-    error = {(row['run'], row['back_end']): row['ate_m'] for row in main
-             if row['stage'] == main[0]['stage']}
+    error = {(row['run'], row['back_end']): with_interval(row['ate_m'], row['ate_ci95'])
+             for row in main if row['stage'] == main[0]['stage']}
     least, gnc = ((error[CLEAN, name], error[worst['run'], name])
                   for name in ('least_squares', 'gnc'))
-    return (f'Under {title_of(worst["run"], worst["setting"])}, the '
-            f'{stage_title(main[0]).split(",")[0]} is off by '
-            f'{metres(least[1])} m with least squares ({metres(least[0])} m clean), by '
-            f'{metres(gnc[1])} m with GNC ({metres(gnc[0])} m clean), and by '
-            f'{metres(error[CLEAN, "odometry"])} m with odometry alone.')
+    stage, frames = stage_title(main[0]).split(', ')
+    return (f'Under {title_of(worst["run"], worst["setting"])}, with {count(_false(main, worst))} '
+            f'false closures, the {stage} ({frames}) is off by {least[1]} m with least squares '
+            f'(clean {least[0]} m), by {gnc[1]} m with GNC (clean {gnc[0]} m), and by '
+            f'{error[CLEAN, "odometry"]} m with odometry alone.')
+
+
+def _false(rows: Sequence[Mapping[str, Any]], worst: Mapping[str, Any]) -> float:
+    """Return how many false closures the first map of a run got."""
+    return float(next(row['false'] for row in rows if row['run'] == worst['run']))

@@ -14,14 +14,9 @@ from numpy.typing import NDArray
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.methods import is_yardstick, method_of
+from adversarial_lcd_ros.evaluation.paper.frame_results import frame_right, frame_untold
 from adversarial_lcd_ros.evaluation.paper.plots import Curve
-from adversarial_lcd_ros.evaluation.paper.summaries import (
-    USUAL,
-    Summary,
-    frame_right,
-    frame_untold,
-    summarise_methods,
-)
+from adversarial_lcd_ros.evaluation.paper.summaries import USUAL, Summary, summarise_methods
 from adversarial_lcd_ros.evaluation.paper.tables import SETTING
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.registry import TARGETS

@@ -12,11 +12,9 @@ table there. Declines are percentage points of accuracy as printed: negative.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-
-from adversarial_lcd_ros.errors import EvaluationError
 
 OURS = 'Adv-LCD'  # SVM-RBF with eigencentrality: the paper's proposal
 ALPHA = 0.05
@@ -59,24 +57,6 @@ class PrintedTable:
     def mean(self, method: str) -> float:
         """Return the average that the printed cells of a method give."""
         return float(np.mean(self.columns[method]))
-
-    def corrected(self, method: str, row: str, value: float) -> PrintedTable:
-        """
-        Return the table with another value in one cell and the average that follows.
-
-        Raises
-        ------
-        EvaluationError
-            There is no such cell.
-
-        """
-        if row not in self.rows or method not in self.columns:
-            raise EvaluationError(f'table {self.number} has no cell {row!r}, {method!r}')
-        cells = tuple(value if name == row else cell
-                      for name, cell in zip(self.rows, self.columns[method], strict=True))
-        mean = round(float(np.mean(cells)), 2)
-        return replace(self, columns={**self.columns, method: cells},
-                       averages={**self.averages, method: mean})
 
 
 @dataclass(frozen=True)
@@ -122,10 +102,6 @@ PRINTED_TABLES = (SURROGATE_TABLE, PERTURBATION_TABLE, BUDGET_TABLE)
 CLAIMED_LEADS = {3: {'SVM-linear': 12.6, 'SVM-poly': 7.3, 'Bayesian': 2.7},
                  5: {'Random Walk': 9.6, 'Shortest Path': 4.0},
                  6: {'Random Walk': 7.9, 'Shortest Path': 3.1}}
-
-# One cell that, if printed wrongly, explains the lead in the text and the whole of Table 4.
-# Our inference: the paper does not say so.
-REPAIR = ('SVM-poly', 'garden', -19.89)
 
 
 def misprints() -> list[Misprint]:

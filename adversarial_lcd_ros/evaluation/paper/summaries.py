@@ -6,9 +6,9 @@ Cells of the paper's experiments, summarised: repeats averaged, the sequence as 
 
 A cell is one attack on one sequence with one seed. Seeds are repeats of a measurement, not
 further evidence: they are averaged within the sequence. The interval of a sequence is the block
-bootstrap over its frames (see ``statistics``): whole frames with all their repeats are drawn, in
+bootstrap over its frames (``intervals``): whole frames with all their repeats are drawn, in
 blocks of neighbours in time. It covers the choice of frames; what other places would give is
-only seen by comparing sequences (``summarise_methods``, ``paper_ranks``).
+only seen by comparing sequences (``summarise_methods``, ``ranks``).
 
 A sequence whose graphs allow no edit is in no mean, and listed: a decline of 0 there says nothing
 of an attack. Over sequences the interval is Student's t: a bootstrap of four values is too narrow.
@@ -17,22 +17,24 @@ Rows tell whether the detector was trained on the sequence, by the card beside i
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from functools import partial
 import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.methods import COLUMNS, is_yardstick, method_of
-from adversarial_lcd_ros.evaluation.metrics import FRAME_KINDS, UNTOLD_MATCH, right
+from adversarial_lcd_ros.evaluation.paper.frame_results import (
+    decline_ci95,
+    different_frames,
+    right_before,
+)
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE
 
 KIND, SCHEMA = 'frames', 6  # of summary.json
 
@@ -47,8 +49,6 @@ _MEANS = ('accuracy_clean', 'accuracy_attacked', 'balanced_clean', 'balanced_att
           'decline_pp', 'suppressed', 'invented', 'invented_elsewhere', 'left_out',
           'unattackable', 'frames', 'positives', 'negatives', 'nodes_mean', 'edges_mean',
           'edits_mean', 'queries_mean', 'success_rate')
-_KINDS = dict(zip(FRAME_KINDS, (POSITIVE, NEGATIVE, 0, 0, 0, 0), strict=True))
-_BOOTSTRAP_SEED = 0
 
 # Figures of a cell over its seeds, or of a method over sequences.
 Summary = dict[str, Any]
@@ -159,17 +159,6 @@ def declines_by_sequence(cells: Iterable[Summary],
             for title, declines in table.items()}
 
 
-def frame_right(row: Row, which: str) -> NDArray[np.bool_]:
-    """Return which decisions of a cell were right, (n,); ``which`` is 'clean' or 'attacked'."""
-    return np.array([_is_right(frame[which], row) for frame in row['frame_results']], bool)
-
-
-def frame_untold(row: Row) -> NDArray[np.bool_]:
-    """Return which frames are in no figure: a match, clean or attacked, cannot be told, (n,)."""
-    return np.array([UNTOLD_MATCH in (frame['clean'], frame['attacked'])
-                     for frame in row['frame_results']], bool)
-
-
 def _cell_key(row: Row) -> tuple[Hashable, ...]:
     missing = [name for name in (*CELL, *_MEANS, 'seed', 'frame_results', 'duration_s')
                if name not in row and name not in ('asked_target', *USUAL)]
@@ -201,13 +190,13 @@ def _summarise(rows: Sequence[Row]) -> Summary:
         raise EvaluationError(f'two rows of {cell} with one seed among {seeds}: keep one of '
                               'each, or the repeats would be counted twice')
     declines = [row['decline_pp'] for row in rows if row['decline_pp'] is not None]
-    positive, negative = _right_before(rows)
+    positive, negative = right_before(rows)
     cell.update({name: _mean(row[name] for row in rows) for name in _MEANS})
     cell.update(name=rows[0].get('name') or '', seeds=len(seeds),
                 trained_on=rows[0].get('trained_on'), told_by=rows[0].get('told_by') or '',
-                **_different_frames(rows),
+                **different_frames(rows),
                 decline_sd_pp=float(np.std(declines, ddof=1)) if len(declines) > 1 else None,
-                ci95=_decline_interval(rows), found_clean=positive, silent_clean=negative,
+                ci95=decline_ci95(rows), found_clean=positive, silent_clean=negative,
                 duration_s=math.fsum(row['duration_s'] for row in rows))
     return cell
 
@@ -215,59 +204,6 @@ def _summarise(rows: Sequence[Row]) -> Summary:
 def _mean(values: Iterable[float | None]) -> float | None:
     there = [value for value in values if value is not None]
     return math.fsum(there) / len(there) if there else None  # fsum: any order, same sum
-
-
-def _right_before(rows: Sequence[Row]) -> tuple[float, float]:
-    counts = [[int((frame_right(row, 'clean') & (_kinds(row) == kind)).sum()) for row in rows]
-              for kind in (POSITIVE, NEGATIVE)]
-    return float(np.mean(counts[0])), float(np.mean(counts[1]))
-
-
-def _different_frames(rows: Sequence[Row]) -> dict[str, int]:
-    # By pairs a frame may be the query of a loop with one seed and of another place with the next.
-    counts = Counter(kind for _, kind in {
-        (frame['stamp'], int(kind)) for row in rows
-        for frame, kind in zip(row['frame_results'], _kinds(row), strict=True)})
-    return {'different_positives': counts[POSITIVE], 'different_negatives': counts[NEGATIVE]}
-
-
-def _kinds(row: Row) -> NDArray[np.int8]:
-    kinds = [_KINDS.get(frame['kind'], frame['kind']) for frame in row['frame_results']]
-    strange = [kind for kind in kinds if kind not in (POSITIVE, NEGATIVE, 0)]
-    if strange:
-        raise EvaluationError(f'{row["sequence"]}: a frame of kind {strange[0]!r}: expected one '
-                              f'of {", ".join(FRAME_KINDS)}')
-    return np.array(kinds, np.int8)
-
-
-def _is_right(value: Any, row: Row) -> bool:
-    if isinstance(value, str) and value in ('TP', 'TN', 'FP', 'FN', 'WM', UNTOLD_MATCH, ''):
-        return bool(right(np.array(value)))
-    if isinstance(value, (bool, np.bool_)):
-        return bool(value)
-    raise EvaluationError(f'{row["sequence"]}: the decision on a frame is {value!r}: expected an '
-                          'outcome such as TP, or true and false')
-
-
-def _decline_interval(rows: Sequence[Row]) -> tuple[float, float] | None:
-    # Repeats may score different frames: sizes and sums are kept for each frame of any.
-    stamps = np.unique([frame['stamp'] for row in rows for frame in row['frame_results']])
-    if len(stamps) < 2:
-        return None
-    size, total = np.zeros((2, 2, len(stamps)), np.int64)
-    for row in rows:
-        place = np.searchsorted(stamps, [frame['stamp'] for frame in row['frame_results']])
-        if len(np.unique(place)) < len(place):
-            raise EvaluationError(f'{row["sequence"]}, seed {row["seed"]}: two frames have one '
-                                  'stamp')
-        lost = frame_right(row, 'clean').astype(np.int64) - frame_right(row, 'attacked')
-        for index, kind in enumerate((POSITIVE, NEGATIVE)):
-            member = (_kinds(row) == kind) & ~frame_untold(row)
-            size[index, place] += member
-            total[index, place] += np.where(member, lost, 0)
-    interval = intervals.class_mean_interval(
-        size, total, intervals.block_frames(stamps.astype(np.int64)), _BOOTSTRAP_SEED)
-    return None if interval is None else (100.0 * interval[0], 100.0 * interval[1])
 
 
 def _yardstick(cell: Summary) -> tuple[Hashable, ...]:

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from adversarial_lcd_ros.config import LcdConfig
-from adversarial_lcd_ros.evaluation.metrics import outcomes
+from adversarial_lcd_ros.evaluation.outcomes import outcomes
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.labels import UNTOLD

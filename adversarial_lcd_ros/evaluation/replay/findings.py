@@ -57,17 +57,26 @@ def headline(summary: Mapping[str, Any]) -> str:
                 f'{_changes(summary, attack)}.')
     bounds = attack['decline_ci95']
     if bounds is not None and bounds[0] <= 0:
-        return (f'No attack lowered the balanced accuracy on {name} beyond chance. The strongest, '
-                f'{attack_title(attack)}{_owner(attack)}, changed it from '
-                f'{percent(clean["balanced_accuracy"])} '
-                f'to {percent(attack["balanced_accuracy"])}: a decline of '
-                f'{points(attack["decline_pp"])} points (95{NARROW_SPACE}% interval '
-                f'{interval(bounds)}), with {effort}.{_papers_own(summary, attack)}')
+        return f'{_unsure(summary, attack)}{_papers_own(summary, attack)}'
     return (f'{_subject(attack)} took {points(attack["decline_pp"])} points off the balanced '
             f'accuracy of loop closure on {name}, from {percent(clean["balanced_accuracy"])} to '
             f'{percent(attack["balanced_accuracy"])} (95{NARROW_SPACE}% interval of the decline '
             f'{interval(bounds)}), with {effort}. {sentence(_changes(summary, attack))}.'
             f'{_papers_own(summary, attack)}')
+
+
+def _unsure(summary: Mapping[str, Any], attack: Attack) -> str:
+    """Return what the strongest attack came to, where its interval does not exclude chance."""
+    name, effort = summary['sequence'], _effort(summary, attack)
+    before, after = (percent(run['balanced_accuracy']) for run in (summary['clean'], attack))
+    bounds = f'95{NARROW_SPACE}% interval {interval(attack["decline_ci95"])}'
+    title = f'{attack_title(attack)}{_owner(attack)}'
+    if round(attack['decline_pp'], 1) <= 0:
+        return (f'No attack lowered the balanced accuracy on {name}: of {before}, {title}, left '
+                f'{after} ({bounds} points), with {effort}.')
+    return (f'The strongest attack on {name}, {title}, took {points(attack["decline_pp"])} points '
+            f'off the balanced accuracy, from {before} to {after}, with {effort}. So few frames '
+            f'leave open whether that is chance: {bounds}.')
 
 
 def _subject(attack: Attack) -> str:
@@ -148,7 +157,8 @@ def _headline_without_labels(summary: Mapping[str, Any]) -> str:
 def _effort(summary: Mapping[str, Any], attack: Attack) -> str:
     if _is_scene_alone(attack):
         hung = attack['poster']
-        return (f'a poster of {percent(hung["share"], 0)} of the frame ({hung["kind"]}) at '
+        what = 'two posters over' if hung.get('sheets') == 2 else 'a poster of'
+        return (f'{what} {percent(hung["share"], 0)} of the frame ({hung["kind"]}) at '
                 f'{hung["spans"].replace(",", " and")} s, and no message changed')
     if attack.get('nodes_moved_mean'):
         return (f'{mean_count(attack["nodes_moved_mean"])} of {number(summary["nodes_mean"], 0)} '

@@ -14,7 +14,8 @@ import numpy as np
 
 from adversarial_lcd_ros.config import LabelConfig
 from adversarial_lcd_ros.errors import ConfigError
-from adversarial_lcd_ros.evaluation.metrics import Outcomes, balanced_accuracy, effect, outcomes
+from adversarial_lcd_ros.evaluation.metrics import balanced_accuracy, effect
+from adversarial_lcd_ros.evaluation.outcomes import Outcomes, outcomes
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord, column, runs_of
 from adversarial_lcd_ros.files.writing import write_csv
 from adversarial_lcd_ros.ground_truth.labels import (
@@ -33,7 +34,6 @@ _GRID: Mapping[str, tuple[float, ...]] = {
     'loop_share': (0.4, 0.7), 'elsewhere_share': (0.05, 0.2),
     'min_gap_s': (4.0, 12.0, 16.0), 'positive_distance_m': (0.3, 1.0),
     'positive_angle_deg': (15.0, 40.0)}
-
 
 
 def label_variants(base: LabelConfig) -> Iterator[tuple[str, LabelConfig]]:

@@ -12,6 +12,7 @@ from typing import Any
 from adversarial_lcd_ros.config import (
     AttackConfig,
     BuilderConfig,
+    Config,
     LabelConfig,
     LcdConfig,
     ReplayConfig,
@@ -51,6 +52,13 @@ class Plan:
     seed: int = 42
     sweep_labels: bool = False
     posters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @property
+    def sections(self) -> dict[str, Config | None]:
+        """All settings that decide what the runs give, by what they are of."""
+        return {'builder': self.builder, 'lcd': self.lcd, 'replay': self.replay,
+                **{f'attack {name}': attack for name, attack in self.attacks.items()},
+                **{f'poster {name}': self.replay_of(name) for name in self.posters}}
 
     def replay_of(self, run: str) -> ReplayConfig:
         """Return the settings by which a run is replayed."""

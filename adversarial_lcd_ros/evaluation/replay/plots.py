@@ -14,7 +14,14 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.evaluation.page import CLEAN_COLOUR, GRID, STYLE, attack_colour, svg
+from adversarial_lcd_ros.evaluation.page import (
+    CLEAN_COLOUR,
+    GRID,
+    NARROW,
+    STYLE,
+    attack_colour,
+    svg,
+)
 from adversarial_lcd_ros.evaluation.replay.records import QueryRecord, column
 from adversarial_lcd_ros.ground_truth.labels import NEGATIVE, POSITIVE, UNTOLD
 
@@ -51,7 +58,7 @@ def decline_over_threshold(clean: Sequence[QueryRecord], attacks: Sequence[Run],
     if not attacks or np.isnan(before).all():
         return None
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 3.7), layout='constrained')
+        figure = Figure(figsize=(NARROW, 3.3), layout='constrained')
         axes = figure.subplots()
         axes.axhline(0, color=GRID, linewidth=1.0)
         axes.axvline(threshold, color='#9aa0a8', linewidth=0.8, linestyle=(0, (4, 3)))

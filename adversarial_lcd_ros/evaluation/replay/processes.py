@@ -29,7 +29,7 @@ from adversarial_lcd_ros.messages.codec import (
 )
 from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 from adversarial_lcd_ros.paths import share_path
-from adversarial_lcd_ros.sequences.replay import read_payloads
+from adversarial_lcd_ros.sequences.replay import read_messages
 
 RECORDING = 'recording'
 _MAN_IN_THE_MIDDLE = ('-r', 'graph:=graph_clean')
@@ -132,7 +132,9 @@ def _parameters(bag: Path, setup: Setup, recording: Path) -> dict[str, object]:
     if setup.builder:
         sections['graph_builder'] = {**asdict(setup.builder), **key}
     if setup.attack:
-        sections['attacker'] = asdict(setup.attack)
+        # On a busy machine an answer may be slow; an attack that ends for it is another attack.
+        sections['attacker'] = {**asdict(setup.attack),
+                                'query_timeout_s': setup.replay.timeout_s / 2}
     return {f'/**/{node}': {'ros__parameters': values} for node, values in sections.items()}
 
 
@@ -159,13 +161,9 @@ def node_environment(domain: int, spare: Path | None = None) -> Mapping[str, str
 def read_recording(folder: Path, attacked: bool) -> Recording:
     """Return what ``run_pipeline`` recorded in a folder; raises SequenceError, CodecError."""
     recording = folder / RECORDING
-    forwarded = [decode_graph(payload) for _, payload in read_payloads(recording, 'graph')]
-    decisions = [decode_loop_closure(payload)
-                 for _, payload in read_payloads(recording, 'loop_closures')]
+    forwarded = read_messages(recording, 'graph', decode_graph)
+    decisions = read_messages(recording, 'loop_closures', decode_loop_closure)
     if not attacked:
         return Recording(forwarded, forwarded, decisions, [])
-    return Recording(
-        [decode_graph(payload) for _, payload in read_payloads(recording, 'graph_clean')],
-        forwarded, decisions,
-        [decode_attack_report(payload)
-         for _, payload in read_payloads(recording, 'attack_report')])
+    return Recording(read_messages(recording, 'graph_clean', decode_graph), forwarded, decisions,
+                     read_messages(recording, 'attack_report', decode_attack_report))

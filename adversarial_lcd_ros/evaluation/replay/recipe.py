@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.attack.images.posting import spans_in
+from adversarial_lcd_ros.attack.images.posting import Posting, spans_in
 from adversarial_lcd_ros.config import AttackConfig, ReplayConfig
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.methods import attack_columns, used_settings
@@ -23,9 +24,27 @@ POSTERS = 'posters'  # where configuration.json says in which runs one hung
 _MAX_NAME, _POSTER = 200, 'poster'
 
 
-def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConfig]:
+@dataclass(frozen=True)
+class ReplayRecipe:
     """
-    Return the attacks of a recipe by name, in its order.
+    What is run.
+
+    Attributes
+    ----------
+    attacks : dict of AttackConfig
+        Settings of every attack by the name of its run, in the order of the recipe.
+    posters : dict of dict
+        Settings of ``bag_replay`` by which a poster hangs in a run, by its name.
+
+    """
+
+    attacks: dict[str, AttackConfig]
+    posters: dict[str, dict[str, Any]]
+
+
+def load_recipe(name: str, overrides: Mapping[str, Any]) -> ReplayRecipe:
+    """
+    Return the attacks of a recipe, and the posters that hang while they run.
 
     Where overrides make another attack of one, such as another search, it is called by its
     settings: its name in the recipe would tell of what did not run. Attacks that overrides make
@@ -41,19 +60,27 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
     Raises
     ------
     ConfigError
-        There is no such recipe, or it is not of the expected form.
+        There is no such recipe, or it is not of the expected form; or settings of a replay are
+        no poster's, or no poster.
 
     """
-    path, entries = _entries(name)
-    names, attacks = {'clean'}, dict[str, AttackConfig]()
-    for title, entry in entries:
+    path, content = read_recipe(name)
+    if content.pop('protocol') != LIVE:
+        raise ConfigError(f'recipe {path} is for whole evaluations: "adversarial-lcd evaluate '
+                          'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
+    if set(content) != {'attacks'}:
+        raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
+    names, attacks, posters = {'clean'}, dict[str, AttackConfig](), dict[str, dict[str, Any]]()
+    for entry in content['attacks']:
+        title = _run_name(path, entry)
         if title in names:
             raise ConfigError(f'recipe {path}: the name {title!r} is taken')
         names.add(title)
-        settings = {name: value for name, value in entry.items()
-                    if name not in ('name', REPLAY)}
+        settings = {name: value for name, value in entry.items() if name not in ('name', REPLAY)}
         attack = AttackConfig.from_mapping({**settings, **overrides})
-        if REPLAY not in entry:  # what a poster does hangs on no setting of the attacker
+        if REPLAY in entry:
+            posters[title] = _poster(f'recipe {path}, {title}', entry[REPLAY])
+        else:  # what a poster does hangs on no setting of the attacker
             if overrides and used_settings(attack) in map(used_settings, attacks.values()):
                 continue
             title = _title(title, AttackConfig.from_mapping(settings), attack, attacks)
@@ -61,7 +88,7 @@ def load_recipe(name: str, overrides: Mapping[str, Any]) -> dict[str, AttackConf
     if len(attacks) > MAX_ATTACKS:
         raise ConfigError(f'recipe {path} has {len(attacks)} attacks, each a replay of the bag: '
                           f'expected at most {MAX_ATTACKS}')
-    return attacks
+    return ReplayRecipe(attacks, posters)
 
 
 def _title(title: str, meant: AttackConfig, attack: AttackConfig,
@@ -74,46 +101,15 @@ def _title(title: str, meant: AttackConfig, attack: AttackConfig,
     return f'{by_settings} (in place of {title})' if by_settings in taken else by_settings
 
 
-def load_posters(name: str) -> dict[str, dict[str, Any]]:
-    """
-    Return the settings of ``bag_replay`` by which a poster hangs in a run, by its name.
-
-    Parameters
-    ----------
-    name : str
-        As for ``load_recipe``.
-
-    Raises
-    ------
-    ConfigError
-        As ``load_recipe``; or settings are no poster's, or no poster.
-
-    """
-    path, entries = _entries(name)
-    return {title: _poster(f'recipe {path}, {title}', entry[REPLAY])
-            for title, entry in entries if REPLAY in entry}
-
-
-def _entries(name: str) -> tuple[Path, Iterator[tuple[str, dict[str, Any]]]]:
-    """Return the path of a recipe, and what yields name and settings of its attacks."""
-    path, content = read_recipe(name)
-    if content.pop('protocol') != LIVE:
-        raise ConfigError(f'recipe {path} is for whole evaluations: "adversarial-lcd evaluate '
-                          'SEQUENCE ... --recipe" runs it; here the protocol is "live"')
-    if set(content) != {'attacks'}:
-        raise ConfigError(f'recipe {path}: expected a list "attacks" and nothing else')
-
-    def named() -> Iterator[tuple[str, dict[str, Any]]]:
-        for entry in content['attacks']:
-            if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
-                raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
-            title = entry['name']
-            if not title.isprintable() or len(title) > _MAX_NAME:
-                raise ConfigError(f'recipe {path}: the name {title[:_MAX_NAME]!r} is longer than '
-                                  f'{_MAX_NAME} characters, or not all of them can be printed')
-            yield title, entry
-
-    return path, named()
+def _run_name(path: Path, entry: Any) -> str:
+    """Return the name of an attack, which is also that of its run and row."""
+    if not isinstance(entry, dict) or not isinstance(entry.get('name'), str):
+        raise ConfigError(f'recipe {path}: {entry!r} is no attack with a name')
+    title: str = entry['name']
+    if not title.isprintable() or len(title) > _MAX_NAME:
+        raise ConfigError(f'recipe {path}: the name {title[:_MAX_NAME]!r} is longer than '
+                          f'{_MAX_NAME} characters, or not all of them can be printed')
+    return title
 
 
 def _poster(where: str, settings: Any) -> dict[str, Any]:
@@ -126,4 +122,5 @@ def _poster(where: str, settings: Any) -> dict[str, Any]:
     if hung.poster == NONE or not spans_in(hung.poster_spans):
         raise ConfigError(f'{where}: {REPLAY} hangs no poster: expected poster, and poster_spans, '
                           'when it is seen')
+    Posting(hung, 0)  # two sheets may overlap
     return settings

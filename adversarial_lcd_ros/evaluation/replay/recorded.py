@@ -17,19 +17,15 @@ import numpy as np
 from adversarial_lcd_ros.attack.forging import change_between
 from adversarial_lcd_ros.config import LabelConfig, LcdConfig
 from adversarial_lcd_ros.errors import SequenceError
-from adversarial_lcd_ros.evaluation.replay.behind import ask_check
+from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figures
 from adversarial_lcd_ros.evaluation.replay.offline import run_offline
+from adversarial_lcd_ros.evaluation.replay.pictures import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
-from adversarial_lcd_ros.evaluation.replay.records import CLEAN, AttackRun, make_records
 from adversarial_lcd_ros.evaluation.replay.report import write_results
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
-from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
-from adversarial_lcd_ros.evaluation.replay.unexplained import unexplained_edges
+from adversarial_lcd_ros.evaluation.replay.supervision import Tell
 from adversarial_lcd_ros.evaluation.results import ResultsFolder
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
-from adversarial_lcd_ros.ground_truth.labelling import label_graphs
-from adversarial_lcd_ros.ground_truth.labels import unlabelled
 from adversarial_lcd_ros.messages.codec import (
     decode_attack_report,
     decode_graph,
@@ -45,7 +41,7 @@ from adversarial_lcd_ros.sequences.bagfile import (
     BagFile,
     is_bag,
 )
-from adversarial_lcd_ros.sequences.replay import read_payloads
+from adversarial_lcd_ros.sequences.replay import read_messages
 
 # The run of the attacker that was recorded, whose settings nobody recorded.
 RECORDED = 'recorded'
@@ -133,7 +129,7 @@ def read_recording(path: Path) -> Heard:
 
 
 def _by_stamp(path: Path, topic: str, decode: Callable[[bytes], MessageT]) -> dict[int, MessageT]:
-    messages = [decode(payload) for _, payload in read_payloads(path, topic)]
+    messages = read_messages(path, topic, decode)
     stamps = [message.stamp_ns for message in messages]
     if len(set(stamps)) < len(stamps):
         twice = next(stamp for at, stamp in enumerate(stamps) if stamp in stamps[:at])
@@ -152,7 +148,7 @@ def _report(clean: MultiTierGraph, forwarded: MultiTierGraph) -> AttackReport:
 def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelConfig, *,
                        source: Mapping[str, Any] | None = None, seed: int = 42,
                        command_line: Sequence[str] = (),
-                       tell: Callable[[str], None] = lambda text: None,
+                       tell: Tell = lambda text: None,
                        ) -> tuple[Path, dict[str, Any]]:
     """
     Report on a recorded attack; return the results folder and the summary.
@@ -191,37 +187,24 @@ def evaluate_recording(bag: Path, output: Path, lcd: LcdConfig, labels: LabelCon
     run = heard.run
     sequence = _sequence(bag, run, dict(source or {}), tell)
     tell('the decisions of a clean run, made now of the recorded clean graphs')
-    clean = run_offline(run.clean, lcd)[0].decisions
+    clean = Recording(run.clean, run.clean, list(run_offline(run.clean, lcd)[0].decisions), [])
     notes = [*heard.notes, _agreement(run, lcd)]
     for note in notes:
         tell(note)
-    found = (unlabelled([graph.stamp_ns for graph in run.clean])
-             if sequence.trajectory is None else
-             label_graphs(run.clean, sequence.trajectory, sequence.source, labels))
-    records = make_records(found, clean, {RECORDED: AttackRun(run.decisions, run.reports)})
-    sent = {CLEAN: run.clean, RECORDED: run.forwarded}
-    records = ask_check(records, sent, lcd)
-    if not heard.has_reports:
-        records = [replace(record, status=None, edit_budget=None, node_budget=None,
-                           query_budget=None, queries=None,
-                           loss_before=None, loss_after=None, duration_s=None, reason=None)
-                   for record in records]
-    summary = summarise(sequence.name, records, {RECORDED: None}, GraphStatistics.of(
-        [graph.node_count for graph in run.clean], [graph.edge_count for graph in run.clean]),
-        seed, lcd, told_by=found.told_by)
+    records, summary = make_figures(
+        sequence.name, label_run(sequence, clean, labels), clean, {RECORDED: run},
+        {RECORDED: None}, lcd, seed, reported=heard.has_reports)
     summary['notes'] = notes
-    summary['unexplained_edges'] = unexplained_edges(sent, lcd)
     summary['duration_s'] = time.monotonic() - started_s
     folder = ResultsFolder.create(output)
     folder.write_setup([lcd, labels], command_line, seed, {'source': str(bag.resolve())})
     write_results(folder, summary, records, telling_pictures(
-        sequence, Recording(run.clean, run.clean, list(clean), []), {RECORDED: run}, records,
-        summary))
+        sequence, clean, {RECORDED: run}, records, summary))
     return folder.finish(), summary
 
 
 def _sequence(bag: Path, run: Recording, source: dict[str, Any],
-              tell: Callable[[str], None]) -> CameraSequence | GraphSequence:
+              tell: Tell) -> CameraSequence | GraphSequence:
     """Return the images of the recording, for pictures, or else its graphs alone."""
     with BagFile(bag) as opened:
         has_images = bool(opened.of_type(IMAGE, COMPRESSED_IMAGE))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.errors import EvaluationError, FileError
-from adversarial_lcd_ros.evaluation.metrics import EFFECTS, outcomes
+from adversarial_lcd_ros.evaluation.outcomes import EFFECTS, outcomes
 from adversarial_lcd_ros.files.reading import csv_rows
 from adversarial_lcd_ros.files.writing import plain_cell, write_csv
 from adversarial_lcd_ros.ground_truth.labels import (
@@ -30,16 +30,29 @@ from adversarial_lcd_ros.messages.types import AttackReport, LoopClosure
 CLEAN = 'clean'
 _KINDS = {'positive': POSITIVE, 'negative': NEGATIVE}
 NO_TRUTH = 'no_ground_truth'
+# What the clean and the forwarded graph tell of an attack of which there is no report.
+TOLD_BY_GRAPHS = ('edits', 'nodes_moved')
 _PARSERS: dict[str, Callable[[str], Any]] = {
     'int': int, 'float': float, 'str': plain_cell, 'bool': {'0': False, '1': True}.__getitem__}
 
 
 @dataclass(frozen=True)
 class AttackRun:
-    """What came back over the wire from the replay under one attack."""
+    """
+    What came back over the wire from the replay under one attack.
+
+    Attributes
+    ----------
+    decisions : sequence of LoopClosure
+    reports : sequence of AttackReport
+    reported : bool
+        The attacker made the reports; else they hold what the graphs tell (``TOLD_BY_GRAPHS``).
+
+    """
 
     decisions: Sequence[LoopClosure]
     reports: Sequence[AttackReport]
+    reported: bool = True
 
 
 @dataclass(frozen=True)
@@ -135,7 +148,7 @@ def make_records(labels: FrameLabels, clean: Sequence[LoopClosure],
         _check_frames(f'attack {name}: attack reports', labels.stamp_ns, run.reports)
         rows = _run_records(name, labels, run.decisions)
         records += [
-            QueryRecord(**{**asdict(row), **_report_fields(report),
+            QueryRecord(**{**asdict(row), **_report_fields(report, run.reported),
                            'effect': _effect(was, row)})
             for row, was, report in zip(rows, before, run.reports, strict=True)]
     return records
@@ -202,9 +215,10 @@ def _check_frames(what: str, stamp_ns: NDArray[np.int64],
                           'lost or repeated messages and gives no figure: run it again')
 
 
-def _report_fields(report: AttackReport) -> dict[str, Any]:
+def _report_fields(report: AttackReport, reported: bool) -> dict[str, Any]:
     shared = {entry.name for entry in fields(QueryRecord)} - {'stamp_ns'}
-    return {name: value for name, value in asdict(report).items() if name in shared}
+    known = shared if reported else TOLD_BY_GRAPHS
+    return {name: value for name, value in asdict(report).items() if name in known}
 
 
 def runs_of(records: Sequence[QueryRecord]) -> dict[str, list[QueryRecord]]:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 import shutil
@@ -23,6 +22,7 @@ from adversarial_lcd_ros.evaluation.replay.processes import (
     run_pipeline,
 )
 from adversarial_lcd_ros.evaluation.replay.records import CLEAN
+from adversarial_lcd_ros.evaluation.replay.supervision import Tell
 from adversarial_lcd_ros.evaluation.replay.unfinished import finished_in_s, mark_finished
 from adversarial_lcd_ros.graph_sequences.bags import CLEAN_TOPIC, GRAPH_TOPIC, write_graphs
 from adversarial_lcd_ros.graph_sequences.opening import GraphSequence
@@ -50,7 +50,7 @@ class Replays:
     """
 
     def __init__(self, bag: Path, sequence: CameraSequence | GraphSequence, plan: Plan,
-                 folder: Path, domain: int, tell: Callable[[str], None]) -> None:
+                 folder: Path, domain: int, tell: Tell) -> None:
         self._bag, self._sequence, self._plan = bag, sequence, plan
         self._folder, self._domain, self._tell = folder, domain, tell
         self._frames = Replay(bag, plan.replay).frame_count

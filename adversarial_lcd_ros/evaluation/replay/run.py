@@ -14,7 +14,7 @@ nothing is lost. A run with a poster of its own always starts from the images.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -25,24 +25,17 @@ from typing import Any
 
 from adversarial_lcd_ros.config import BuilderConfig
 from adversarial_lcd_ros.errors import AdversarialLcdError, EvaluationError
-from adversarial_lcd_ros.evaluation.pictures import Picture
-from adversarial_lcd_ros.evaluation.replay.behind import ask_check
 from adversarial_lcd_ros.evaluation.replay.domain import own_domain
+from adversarial_lcd_ros.evaluation.replay.figures import label_run, make_figures
 from adversarial_lcd_ros.evaluation.replay.label_variants import SWEEP, sweep_labels, write_sweep
+from adversarial_lcd_ros.evaluation.replay.pictures import telling_pictures
 from adversarial_lcd_ros.evaluation.replay.plan import Plan
 from adversarial_lcd_ros.evaluation.replay.processes import Recording
 from adversarial_lcd_ros.evaluation.replay.recipe import POSTERS
-from adversarial_lcd_ros.evaluation.replay.records import (
-    CLEAN,
-    AttackRun,
-    QueryRecord,
-    make_records,
-)
+from adversarial_lcd_ros.evaluation.replay.records import CLEAN, QueryRecord
 from adversarial_lcd_ros.evaluation.replay.replays import Replays
 from adversarial_lcd_ros.evaluation.replay.report import write_results
-from adversarial_lcd_ros.evaluation.replay.summary import GraphStatistics, summarise
-from adversarial_lcd_ros.evaluation.replay.telling import telling_pictures
-from adversarial_lcd_ros.evaluation.replay.unexplained import unexplained_edges
+from adversarial_lcd_ros.evaluation.replay.supervision import Tell
 from adversarial_lcd_ros.evaluation.replay.unfinished import (
     RECORDINGS,
     finished_in_s,
@@ -57,7 +50,6 @@ from adversarial_lcd_ros.graph_sequences.opening import (
     open_graphs,
 )
 from adversarial_lcd_ros.ground_truth.labelling import label_graphs
-from adversarial_lcd_ros.ground_truth.labels import FrameLabels, unlabelled
 from adversarial_lcd_ros.lcd.targets import check_variant
 from adversarial_lcd_ros.paths import target_path
 from adversarial_lcd_ros.registry import TARGETS
@@ -66,7 +58,7 @@ from adversarial_lcd_ros.sequences import open_sequence
 
 
 def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence[str] = (),
-                  tell: Callable[[str], None] = lambda text: None,
+                  tell: Tell = lambda text: None,
                   keep_recordings: bool = False) -> tuple[Path, dict[str, Any]]:
     """
     Replay a bag without and with every attack; return the results folder and the summary.
@@ -97,21 +89,10 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
     started_s = time.monotonic()
     if holds_graphs(bag):
         plan = _without_builder(bag, plan, tell)
-    sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
-    if sequence.trajectory is None:
-        if plan.sweep_labels:
-            raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
-        tell('no ground truth: decisions that change are counted, none can be scored')
-    target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
-    if isinstance(sequence, GraphSequence):
-        check_variant(TARGETS.find(plan.lcd.target), sequence.graphs[0])
     # Whether the nodes still live is watched here: the replay waits for them without a limit.
     plan = replace(plan, replay=replace(plan.replay, lockstep=True, loop=1, start_timeout_s=0.0))
-    digest = plan_digest(bag, {'builder': plan.builder, 'lcd': plan.lcd, 'replay': plan.replay,
-                               **{f'attack {name}': attack
-                                  for name, attack in plan.attacks.items()},
-                               **{f'poster {name}': plan.replay_of(name)
-                                  for name in plan.posters}}, plan.rebuild)
+    sequence = _open(bag, plan, tell)
+    digest = plan_digest(bag, plan.sections, plan.rebuild)
     with own_domain() as domain, results_folder(output, digest) as folder:
         tell(f'ROS domain {domain}')
         with _kept(folder.path, tell):
@@ -123,34 +104,41 @@ def evaluate_live(bag: Path, output: Path, plan: Plan, *, command_line: Sequence
         if plan.sweep_labels:
             write_sweep(folder.path / SWEEP, summary['label_sweep'])
         summary['duration_s'] = earlier_s + time.monotonic() - started_s
-        _write(folder, plan, summary, records, command_line,
-               {'ros_domain_id': domain, 'source': str(bag.resolve())},
-               telling_pictures(sequence, clean, runs, records, summary, {
-                   name: plan.replay_of(name) for name in plan.posters}))
+        _write_setup(folder, plan, command_line,
+                     {'ros_domain_id': domain, 'source': str(bag.resolve())})
+        write_results(folder, summary, records, telling_pictures(
+            sequence, clean, runs, records, summary,
+            {name: plan.replay_of(name) for name in plan.posters}))
         if not keep_recordings:
             shutil.rmtree(folder.path / RECORDINGS)
         return folder.finish(), summary
+
+
+def _open(bag: Path, plan: Plan, tell: Tell) -> CameraSequence | GraphSequence:
+    """Return what is in the bag; refuse what would fail after the first minutes of a replay."""
+    sequence = open_sequence(bag) if plan.builder else open_graphs(str(bag), BuilderConfig())
+    if sequence.trajectory is None:
+        if plan.sweep_labels:
+            raise EvaluationError(f'{bag} has no ground truth: there are no labels to vary')
+        tell('no ground truth: decisions that change are counted, none can be scored')
+    target_path(plan.lcd.model, plan.lcd.target)  # or the node would end for want of it
+    if isinstance(sequence, GraphSequence):
+        check_variant(TARGETS.find(plan.lcd.target), sequence.graphs[0])
+    return sequence
 
 
 def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
              runs: Mapping[str, Recording], plan: Plan
              ) -> tuple[list[QueryRecord], dict[str, Any]]:
     """Return the records of all runs, and what they come to."""
-    labels = _labels(sequence, clean, plan)
-    records = make_records(labels, clean.decisions, {
-        name: AttackRun(run.decisions, run.reports) for name, run in runs.items()})
-    sent = {CLEAN: clean.clean, **{name: run.forwarded for name, run in runs.items()}}
-    records = ask_check(records, sent, plan.lcd)
-    summary = summarise(sequence.name, records, plan.attacks, GraphStatistics.of(
-        [graph.node_count for graph in clean.clean],
-        [graph.edge_count for graph in clean.clean]), plan.seed, plan.lcd,
-        told_by=labels.told_by)
+    records, summary = make_figures(
+        sequence.name, label_run(sequence, clean, plan.labels), clean, runs, plan.attacks,
+        plan.lcd, plan.seed)
     for attack in summary['attacks']:
         if attack['name'] in plan.posters:
             hung = plan.replay_of(attack['name'])
             attack['poster'] = {'kind': hung.poster, 'share': hung.poster_share,
-                                'spans': hung.poster_spans}
-    summary['unexplained_edges'] = unexplained_edges(sent, plan.lcd)
+                                'sheets': hung.poster_sheets, 'spans': hung.poster_spans}
     summary['graphs_rebuilt_differently'] = {
         name: _differing(clean.clean, run.clean) for name, run in runs.items()
         if name not in plan.posters}
@@ -161,7 +149,7 @@ def _figures(sequence: CameraSequence | GraphSequence, clean: Recording,
 
 
 @contextmanager
-def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
+def _kept(folder: Path, tell: Tell) -> Iterator[None]:
     """Say what is kept of an evaluation that ends early."""
     try:
         yield
@@ -173,14 +161,7 @@ def _kept(folder: Path, tell: Callable[[str], None]) -> Iterator[None]:
         raise
 
 
-def _labels(sequence: CameraSequence | GraphSequence, clean: Recording,
-            plan: Plan) -> FrameLabels:
-    if sequence.trajectory is None:
-        return unlabelled([graph.stamp_ns for graph in clean.clean])
-    return label_graphs(clean.clean, sequence.trajectory, sequence.source, plan.labels)
-
-
-def _without_builder(bag: Path, plan: Plan, tell: Callable[[str], None]) -> Plan:
+def _without_builder(bag: Path, plan: Plan, tell: Tell) -> Plan:
     if plan.rebuild:
         raise EvaluationError(f'{bag} has graphs and no images: nothing can be rebuilt')
     if plan.posters:
@@ -195,10 +176,8 @@ def _differing(first: Sequence[MultiTierGraph], second: Sequence[MultiTierGraph]
     return sum(a != b for a, b in zip(first, second, strict=True))
 
 
-def _write(folder: ResultsFolder, plan: Plan, summary: Mapping[str, Any],
-           records: Sequence[QueryRecord], command_line: Sequence[str],
-           extra: Mapping[str, Any], pictures: Sequence[Picture]) -> None:
+def _write_setup(folder: ResultsFolder, plan: Plan, command_line: Sequence[str],
+                 extra: Mapping[str, Any]) -> None:
     sections = (plan.builder, plan.lcd, plan.labels, plan.replay, *plan.attacks.values())
     folder.write_setup([section for section in sections if section], command_line, plan.seed,
                        {**extra, **({POSTERS: dict(plan.posters)} if plan.posters else {})})
-    write_results(folder, summary, records, pictures)

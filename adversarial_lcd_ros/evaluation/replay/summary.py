@@ -18,14 +18,12 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.evaluation import intervals
 from adversarial_lcd_ros.evaluation.methods import attack_columns
 from adversarial_lcd_ros.evaluation.metrics import (
-    FRAME_KINDS,
     Metrics,
     effect,
     first_closure_latency_s,
     measure,
-    right,
-    told_kind,
 )
+from adversarial_lcd_ros.evaluation.outcomes import FRAME_KINDS, right, told_kind
 from adversarial_lcd_ros.evaluation.replay.behind import behind_check
 from adversarial_lcd_ros.evaluation.replay.records import (
     CLEAN,

@@ -18,7 +18,7 @@ from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.start import SUPERVISOR
 
 STARTING, READY, PLAYING = 'starting', 'ready', 'playing'
-STOP_TIMEOUT_S = 15.0
+STOP_TIMEOUT_S = 60.0
 # After an error or a signal nobody waits for what a node would still like to do.
 _HASTY_STOP_S = 0.7
 _POLL_S = 0.05

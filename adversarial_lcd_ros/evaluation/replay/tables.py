@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
-
-from rich.table import Table
 
 from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.replay.findings import is_labelled
@@ -110,21 +108,14 @@ def _declared_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     } for title, run in runs]
 
 
-def sweep_table(summary: Mapping[str, Any]) -> Table:
-    """Return what each run would be worth by other labels."""
-    rows = [{'labels': row['labels'], 'run': row['run'],
-             'loops / new places': f'{row["positives"]} / {row["negatives"]}',
-             'balanced': wording.percent(row['balanced_accuracy']),
-             'decline, points': wording.number(row['decline_pp']),
-             'suppressed': str(row['suppressed']), 'invented': str(row['invented'])}
-            for row in summary['label_sweep']]
-    return _table('The same decisions by other labels', rows)
-
-
-def _table(title: str, rows: Sequence[Mapping[str, str]]) -> Table:
-    table = Table(title=title, title_justify='left')
-    for index, heading in enumerate(rows[0] if rows else ()):
-        table.add_column(heading, justify='left' if index == 0 else 'right')
-    for row in rows:
-        table.add_row(*row.values())
-    return table
+def sweep_rows(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Return what each run would be worth by other labels, one row a run and labels."""
+    return [{
+        'labels': row['labels'],
+        'run': row['run'],
+        'loops / new places': f'{row["positives"]} / {row["negatives"]}',
+        'balanced': wording.percent(row['balanced_accuracy']),
+        'decline, points': wording.number(row['decline_pp']),
+        'suppressed': str(row['suppressed']),
+        'invented': str(row['invented']),
+    } for row in summary['label_sweep']]

@@ -57,25 +57,26 @@ def headline(ranks: Sequence[Rank]) -> str:
     target = ranks[0].target
     here = [rank for rank in ranks if rank.target == target]
     bare = next((rank for rank in here if rank.defence == 'none'), here[-1])
-    said = [f'Before any attack {target} is right on {wording.percent(bare.clean)}'
-            f'{_over(len(bare.each))}.']
+    said = [f'Before any attack {target} has a balanced accuracy of '
+            f'{wording.percent(bare.clean)}{_over(len(bare.each))}.']
     for place, whose in ((0, 'the strongest attack on each frame that flips edges within the '
                              'usual budget'), (len(LEVELS) - 1, 'the strongest of all attacks')):
-        known = [rank for rank in here if rank.unharmed[place] is not None]
-        if bare.held[place] is None or not known:
+        known = [rank for rank in here if rank.held[place] is not None]
+        if bare.held[place] is None:
             continue
-        best = max([bare, *known], key=lambda rank: rank.unharmed[place] or 0.0)
+        best = max([bare, *known], key=lambda rank: rank.held[place] or 0.0)
         said.append(f'Without a defence, {whose} leaves {wording.percent(bare.held[place])}; '
                     + ('no defence that was tried leaves more.' if best is bare else
-                       f'behind {best.defence}, {_left(best, place)}.'))
-    return ' '.join(said)
+                       f'behind {best.defence}, {wording.percent(best.held[place])} are left.'))
+    return ' '.join([*said, *map(_refusing, here)]).rstrip()
 
 
-def _left(rank: Rank, place: int) -> str:
-    left = f'{wording.percent(rank.unharmed[place])} are left'
-    if rank.unharmed[place] == rank.held[place]:
-        return left
-    return f'{left}, refusals, with an alarm each, counted as attacks that failed'
+def _refusing(rank: Rank) -> str:
+    """Return what a defence leaves that refuses graphs; '' for any other."""
+    if rank.unharmed[-1] in (None, rank.held[-1]):
+        return ''
+    return (f'{wording.sentence(rank.defence)} refuse what was changed, with an alarm each: '
+            f'counting that as a failed attack, {wording.percent(rank.unharmed[-1])} are left.')
 
 
 def _over(sequences: int) -> str:

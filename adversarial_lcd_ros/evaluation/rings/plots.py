@@ -7,28 +7,45 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+import numpy as np
+from scipy.stats import binomtest
 
 from adversarial_lcd_ros.config import LcdConfig
 from adversarial_lcd_ros.evaluation.page import ATTACK_COLOURS, GRID, STYLE, attack_colour, svg
 from adversarial_lcd_ros.evaluation.rings.scene import SAME
 from adversarial_lcd_ros.evaluation.rings.summaries import FLIPS, Summary
 
-Line = dict[float, float]
+_APART = 0.025  # of a place on the axis, from line to line: intervals stand side by side
+
+
+class Point(NamedTuple):
+    """A figure and the bounds of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+Line = dict[float, Point]
 # By sequence, and by what else tells a line from others.
 Lines = dict[tuple[str, str], Line]
 
 
 def ring_curves(summary: Mapping[str, Any]) -> bytes:
-    """Draw three columns from the content of summary.json, a row for each sequence; an SVG."""
+    """
+    Draw three columns from the content of summary.json, a row for each sequence; an SVG.
+
+    Bars are 95 % intervals: of a bootstrap over frames, for posters Wilson's.
+    """
     columns = [
         ('perturbation ratio r', 'decline, points', _over(summary['rows'], 'ratio', FLIPS)),
         ('nodes moved at most', 'decline, points', _over(summary['rows'], 'nodes', 'move_nodes')),
-        ('poster, share of the frame', 'pairs with a false loop', _posters(summary['posters']))]
+        ('poster, share of the frame', 'share of pairs fooled', _posters(summary['posters']))]
     sequences = list(dict.fromkeys(sequence for *_, lines in columns for sequence, _ in lines))
     rows = max(len(sequences), 1)
     with matplotlib.rc_context(STYLE):
@@ -38,13 +55,7 @@ def ring_curves(summary: Mapping[str, Any]) -> bytes:
             titles = list(dict.fromkeys(title for _, title in lines))
             for sequence, axes in zip(sequences, panels, strict=False):
                 for number, title in enumerate(titles):
-                    line = lines.get((sequence, title), {})
-                    at = sorted(line)
-                    # Ever thinner: where lines are one, those beneath are seen beside it.
-                    axes.plot(at, [line[place] for place in at], marker='o', markersize=4,
-                              color=attack_colour(number), label=title,
-                              linewidth=max(1.0, 3.6 - 0.4 * number),
-                              linestyle='-' if number < len(ATTACK_COLOURS) else '--')
+                    _draw(axes, lines.get((sequence, title), {}), title, number, len(titles))
                 axes.set(xlabel=what, ylabel=value)
                 _mark_places(axes, {place for line in lines.values() for place in line})
                 axes.set_title(sequence, loc='left', fontsize=9.0)
@@ -54,6 +65,18 @@ def ring_curves(summary: Mapping[str, Any]) -> bytes:
                 panels[-1].legend(*panels[0].get_legend_handles_labels(), fontsize=7.5,
                                   loc='upper left')
         return svg(figure)
+
+
+def _draw(axes: Axes, line: Line, title: str, number: int, lines: int) -> None:
+    """Draw a line and its intervals, the number-th of some."""
+    at = np.array(sorted(line)) * (1 + _APART * (number - (lines - 1) / 2))
+    points = np.array([line[place] for place in sorted(line)]).reshape(-1, 3)
+    colour = attack_colour(number)
+    # Ever thinner: where lines are one, those beneath are seen beside it.
+    axes.plot(at, points[:, 0], marker='o', markersize=4, color=colour, label=title,
+              linewidth=max(1.0, 3.6 - 0.4 * number),
+              linestyle='-' if number < len(ATTACK_COLOURS) else '--')
+    axes.vlines(at, points[:, 1], points[:, 2], color=colour, linewidth=1.4, alpha=0.4)
 
 
 def _mark_places(axes: Axes, places: set[float]) -> None:
@@ -77,7 +100,9 @@ def _over(rows: Sequence[Summary], what: str, kind: str) -> Lines:
             place = row['ratio'] if what == 'ratio' else row['node_budget_mean']
             name = row['attack'] if what == 'ratio' else row.get('moved') or row['search']
             of = '' if row['target'] == LcdConfig.target else f'{row["target"]}, '
-            lines[row['sequence'], f'{of}{name}: {row["defence"]}'][place] = row['decline_pp']
+            low, high = row['ci95'] or (row['decline_pp'],) * 2
+            lines[row['sequence'], f'{of}{name}: {row["defence"]}'][place] = Point(
+                row['decline_pp'], low, high)
     return {title: line for title, line in lines.items() if len(line) > 1}
 
 
@@ -86,6 +111,7 @@ def _posters(rows: Sequence[Summary]) -> Lines:
     for row in rows:
         if row['control'] == SAME and row['count'] == 1 and row['kind'] == 'cells' and (
                 row['target'] == 'wl'):
-            lines[row['sequence'], f'{row["target"]}: {row["check"]}'][row['share']] = (
-                row['to_poster'] / row['pairs'])
+            found = binomtest(row['to_poster'], row['pairs']).proportion_ci(method='wilson')
+            lines[row['sequence'], f'{row["target"]}: {row["check"]}'][row['share']] = Point(
+                row['to_poster'] / row['pairs'], found.low, found.high)
     return {title: line for title, line in lines.items() if len(line) > 1}

@@ -26,25 +26,28 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from adversarial_lcd_ros.attack.images.poster import TWO_SPAN
 from adversarial_lcd_ros.config import (
     POSTERS,
     BuilderConfig,
     Config,
     LabelConfig,
     LcdConfig,
+    names_in,
     setting,
 )
 from adversarial_lcd_ros.errors import ConfigError
 from adversarial_lcd_ros.evaluation.rings.scene import BARE, OTHER, Condition, Scene
+from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.evaluation.streams import GraphSource, Stream, load_stream_graphs
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.lcd.defences import make_defences
 from adversarial_lcd_ros.lcd.detector import LoopClosureDetector
 from adversarial_lcd_ros.lcd.targets import builder_for
 from adversarial_lcd_ros.registry import NONE, TARGETS
-from adversarial_lcd_ros.vision.builder import GraphBuilder, in_variant
+from adversarial_lcd_ros.vision.assembly import in_variant
+from adversarial_lcd_ros.vision.builder import GraphBuilder
 
-Row = dict[str, Any]
 Checks = tuple[tuple[str, LcdConfig], ...]
 
 
@@ -61,7 +64,7 @@ class PosterConfig(Config):
                          'controls, at the last share but where two hang.')
     two_share: float = setting(
         0.1, 'Share of two posters together, in opposite corners; 0: none hang.', low=0.0,
-        high=0.5)
+        high=TWO_SPAN / 2)
     seed: int = setting(42, 'Seed of pairs, textures, places and light.', low=0, high=2**31 - 1)
 
 
@@ -109,9 +112,9 @@ class PairTask:
 
 def conditions_of(config: PosterConfig) -> list[Condition]:
     """Return what is tried: sizes, textures, two posters, and the controls; raises ConfigError."""
-    kinds = _names(config.kinds)
+    kinds = names_in(config.kinds)
     try:
-        shares = sorted(map(float, _names(config.shares)))
+        shares = sorted(map(float, names_in(config.shares)))
     except ValueError:
         shares = [0.0]
     if not all(0 < share <= 1 for share in shares) or not set(kinds) <= set(POSTERS[1:]):
@@ -124,10 +127,6 @@ def conditions_of(config: PosterConfig) -> list[Condition]:
     if config.two_share:
         found.append(Condition(kinds[0], config.two_share, 2))
     return [*found, Condition(kinds[0], largest, 1, OTHER)]
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(',')]
 
 
 def poster_streams(streams: Sequence[Stream]) -> list[Stream]:
@@ -165,7 +164,7 @@ def poster_tasks(stream: Stream, config: PosterConfig, lcd: LcdConfig,
             earlier = int(rng.choice(np.flatnonzero(near))) + 1
             tasks.append(PairTask(
                 stream.name, stream.graphs, builder, earlier, later, known.elsewhere[later],
-                tuple(conditions_of(config)), tuple(_names(config.targets)), tuple(checks), lcd,
+                tuple(conditions_of(config)), tuple(names_in(config.targets)), tuple(checks), lcd,
                 labels.focal_length, config.seed + len(tasks)))
         if len(tasks) == config.pairs:
             break

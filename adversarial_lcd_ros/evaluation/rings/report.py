@@ -5,16 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from adversarial_lcd_ros.config import LabelConfig, LcdConfig
-from adversarial_lcd_ros.environment import code_digest
-from adversarial_lcd_ros.errors import FileError
-from adversarial_lcd_ros.evaluation.frames.cells import Cell
 from adversarial_lcd_ros.evaluation.pictures import read_pictures
 from adversarial_lcd_ros.evaluation.results import (
     CONFIGURATION,
@@ -27,107 +21,15 @@ from adversarial_lcd_ros.evaluation.results import (
 from adversarial_lcd_ros.evaluation.rings.html import rings_html
 from adversarial_lcd_ros.evaluation.rings.page import rings_page
 from adversarial_lcd_ros.evaluation.rings.plots import ring_curves
-from adversarial_lcd_ros.evaluation.rings.posters import (
-    Checks,
-    PosterConfig,
-    counts,
-    poster_tasks,
-    run_pair,
-)
-from adversarial_lcd_ros.evaluation.rings.prices import decision_us, sealing_us
-from adversarial_lcd_ros.evaluation.rings.summaries import defence_title, summarise, worst_cases
+from adversarial_lcd_ros.evaluation.rings.posters import counts
+from adversarial_lcd_ros.evaluation.rings.summaries import summarise, worst_cases
 from adversarial_lcd_ros.evaluation.store import Row
-from adversarial_lcd_ros.evaluation.streams import Stream, load_stream_graphs
-from adversarial_lcd_ros.evaluation.workers import Run
 from adversarial_lcd_ros.files import reading
-from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.files.writing import write_bytes, write_json, write_text
-from adversarial_lcd_ros.graph import MultiTierGraph
 
 KIND, SCHEMA = 'rings', 1
-PAGE, CURVES, POSTERS = 'rings.md', 'rings.svg', 'posters.json'
+PAGE, CURVES = 'rings.md', 'rings.svg'
 SEED = 42
-_CODE = ('attack', 'lcd', 'vision', 'graph', 'edge_rule', 'evaluation/rings/posters',
-         'evaluation/rings/scene', 'evaluation/rings/walls')
-
-
-def run_posters(folder: Path, streams: Sequence[Stream], config: PosterConfig, checks: Checks,
-                lcd: LcdConfig, labels: LabelConfig, run: Run,
-                progress: Callable[[int, int], None]) -> list[Row]:
-    """
-    Return what was declared on each pair of places; what is in the folder is not run again.
-
-    Parameters
-    ----------
-    folder : Path
-    streams : sequence of Stream
-    config, checks
-        Of the recipe.
-    lcd, labels
-        Settings.
-    run : callable
-        From ``local_workers`` or ``dask_workers``.
-    progress : callable
-        Called with pairs done and to do.
-
-    """
-    path = folder / POSTERS
-    digests = {stream.name: _digest(stream, config, checks, lcd, labels) for stream in streams}
-    rows = [row for row in _finished(path) if row['digest'] == digests.get(row['sequence'])]
-    done = {(row['sequence'], row['later']) for row in rows}
-    tasks = [task for stream in streams
-             for task in poster_tasks(stream, config, lcd, checks, labels)
-             if (task.sequence, task.later) not in done]
-    for count, part in enumerate(run(run_pair, tasks), 1):
-        rows += [{**row, 'digest': digests[row['sequence']]} for row in part]
-        write_json(path, {'rows': rows})
-        progress(count, len(tasks))
-    return sorted(rows, key=lambda row: (row['sequence'], row['later']))
-
-
-def _digest(stream: Stream, *settings: object) -> str:
-    """Return a digest of all that the rows of a sequence depend on."""
-    return digest_of(json.dumps([*map(repr, settings), stream.digest,
-                                 code_digest(*_CODE)]).encode())
-
-
-def _finished(path: Path) -> list[Row]:
-    """Return the rows of an earlier run; none where there are none, or not of this form."""
-    try:
-        known = reading.read_json(path) if path.is_file() else None
-    except FileError:
-        known = None
-    rows = known.get('rows') if isinstance(known, dict) else None
-    return [row for row in rows if isinstance(row, dict) and {'digest', 'sequence', 'later'}
-            <= set(row)] if isinstance(rows, list) else []
-
-
-def measured_prices(streams: Sequence[Stream], cells: Sequence[Cell],
-                    lcd: LcdConfig) -> list[Row]:
-    """Return what each defence of some cells costs on each sequence, in time of a decision."""
-    rows: list[Row] = []
-    for stream in streams:
-        graphs = load_stream_graphs(stream.graphs)
-        here = [cell for cell in cells
-                if (cell.nodes, cell.variant_needed) == (stream.nodes, stream.variant)]
-        for target in dict.fromkeys(cell.target for cell in here):
-            rows += [{'sequence': stream.name, 'target': target, **price} for price in
-                     _prices(graphs, [cell for cell in here if cell.target == target],
-                             replace(lcd, target=target))]
-    return rows
-
-
-def _prices(graphs: Sequence[MultiTierGraph], cells: Sequence[Cell],
-            lcd: LcdConfig) -> Iterator[Row]:
-    detectors = list(dict.fromkeys([(), *(cell.detector for cell in cells)]))
-    spent = dict(zip(detectors, decision_us(graphs, lcd, detectors), strict=True))
-    sealing = sealing_us(graphs) if any(cell.sealed for cell in cells) else 0.0
-    for settings, sealed in dict.fromkeys([(settings, False) for settings in detectors] + [
-            (cell.detector, True) for cell in cells if cell.sealed]):
-        us = spent[settings] + sealing * sealed
-        yield {'decision_us': us, 'more_us': us - spent[()], 'defence': defence_title({
-            'detector': ', '.join(f'{name} {value}' for name, value in settings),
-            'threshold': LcdConfig.threshold, 'sealed': sealed})}
 
 
 def write_rings(folder: Path, rows: Sequence[Row], posters: Sequence[Row],

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from adversarial_lcd_ros.attack.images.poster import Poster, frontal_corners, paste, swayed
+from adversarial_lcd_ros.attack.images.poster import Poster, frontal_corners, swayed
 from adversarial_lcd_ros.evaluation.rings.walls import Camera, find_wall
 from adversarial_lcd_ros.graph import MultiTierGraph
 from adversarial_lcd_ros.ground_truth.depth import DepthImages, find_depth
@@ -25,10 +24,7 @@ from adversarial_lcd_ros.sequences.part import SequencePart
 
 # What is compared: the same poster, none, or another of the kind in the later place.
 SAME, BARE, OTHER = 'same', 'no poster', 'another poster'
-# Of the frame: two posters lie in opposite corners of one square of this share.
-TWO_SPAN = 0.5
-_OTHER_SEED, _SECOND_SEED = 1_000_003, 500_009
-_UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
+_OTHER_SEED = 1_000_003
 
 
 @dataclass(frozen=True)
@@ -115,23 +111,18 @@ class Scene:
         found, walls = dict(self.image), 0
         for number, place in enumerate(self.places if condition.count else ()):
             other = number > 0 and condition.control == OTHER
-            textures = [Poster(condition.kind, condition.share,
-                               self.seed + other * _OTHER_SEED + at * _SECOND_SEED).texture
-                        for at in range(condition.count)]
+            poster = Poster(condition.kind, condition.share, self.seed + other * _OTHER_SEED,
+                            condition.count)
             rng = np.random.default_rng((self.seed, number, round(1e4 * condition.share)))
             world = self._wall(place[0], condition, rng)
             walls += world is not None
-            span = condition.share if condition.count == 1 else TWO_SPAN
             height, width = found[place[0]].shape[:2]
-            frontal = frontal_corners(width, height, span, rng)
+            frontal = frontal_corners(width, height, poster.span, rng)
             for index in place:
-                corners = (swayed(frontal, rng) if world is None
-                           else self.camera[index].pixels(world))
-                if corners is None:
-                    continue
-                for at, texture in enumerate(textures):
-                    found[index] = paste(found[index], texture, _part(corners, condition, at),
-                                         rng)
+                square = (swayed(frontal, rng) if world is None
+                          else self.camera[index].pixels(world))
+                if square is not None:
+                    found[index] = poster.hang(found[index], square, rng)
         return found, walls
 
     def _wall(self, index: int, condition: Condition, rng: np.random.Generator
@@ -139,17 +130,6 @@ class Scene:
         if index not in self.depth or condition.count > 1:
             return None
         return find_wall(self.camera[index], self.depth[index], condition.share, rng)
-
-
-def _part(corners: NDArray[np.float64], condition: Condition, number: int
-          ) -> NDArray[np.float64]:
-    """Return the corners of one of the posters that hang in a square, (4, 2)."""
-    if condition.count == 1:
-        return corners
-    side = np.sqrt(condition.share / condition.count / TWO_SPAN)
-    matrix = cv2.getPerspectiveTransform(_UNIT, corners.astype(np.float32))
-    own = (side * _UNIT + number * (1 - side)).astype(np.float32)
-    return np.asarray(cv2.perspectiveTransform(own[None], matrix)[0], np.float64)
 
 
 def _picture(sequence: CameraSequence, number: int) -> NDArray[np.uint8]:

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adversarial_lcd_ros.config import AttackConfig, LcdConfig
-from adversarial_lcd_ros.evaluation import metrics
 from adversarial_lcd_ros.evaluation.frames.cells import SEALED
 from adversarial_lcd_ros.evaluation.intervals import class_mean_interval
+from adversarial_lcd_ros.evaluation.metrics import balanced_accuracy, effect
+from adversarial_lcd_ros.evaluation.outcomes import right, told_kind
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.ground_truth.labels import ELSEWHERE, NEGATIVE, POSITIVE
+from adversarial_lcd_ros.registry import SEARCHES
 
-# What an attacker changes, by his search; all else flips edges.
-NODE_SEARCHES = ('move_nodes', 'replay')
 FLIPS, NODES = 'flips', 'nodes'
 # Worst cases: flips within the usual r, those or as many nodes as usual, and all that is there.
 LEVELS = WITHIN_R, WITHIN_NODES, ANY = (
@@ -34,7 +34,8 @@ _SINCE = {'sealed': False, 'moved': ''}
 
 def ring_of(row: Mapping[str, Any]) -> str:
     """Return what an attack changes: FLIPS or NODES."""
-    return NODES if row['search'] in NODE_SEARCHES else FLIPS
+    search = SEARCHES.look_up(row['search'])
+    return NODES if search is not None and search.changes_nodes else FLIPS
 
 
 def defence_title(row: Mapping[str, Any]) -> str:
@@ -77,9 +78,9 @@ def _entry(rows: Sequence[Row], seed: int) -> Summary:
     kind = np.array([frame['kind'] for frame in frames], np.int8)
     before, after = (np.array([frame[when] for frame in frames])
                      for when in ('clean', 'attacked'))
-    change = metrics.effect(kind, before, after)
+    change = effect(kind, before, after)
     stamps = [frame['stamp'] for frame in frames]
-    lost = metrics.right(before).astype(np.int64) - metrics.right(after)
+    lost = right(before).astype(np.int64) - right(after)
     return {
         **{name: first[name] for name in _GROUP},
         **{name: first.get(name, usual) for name, usual in _SINCE.items()}, 'ring': ring_of(first),
@@ -87,10 +88,10 @@ def _entry(rows: Sequence[Row], seed: int) -> Summary:
         'seeds': len(rows), 'frames': len(frames), 'different_frames': len(set(stamps)),
         'positives': int((kind == POSITIVE).sum()), 'negatives': int((kind == NEGATIVE).sum()),
         'found_clean': int((before == 'TP').sum()), 'silent_clean': int((before == 'TN').sum()),
-        'balanced_clean': metrics.balanced_accuracy(kind, before),
-        'balanced_attacked': metrics.balanced_accuracy(kind, after),
+        'balanced_clean': balanced_accuracy(kind, before),
+        'balanced_attacked': balanced_accuracy(kind, after),
         'decline_pp': change.decline_pp,
-        'ci95': _times(_interval(stamps, metrics.told_kind(kind, before, after), lost, seed),
+        'ci95': _times(_interval(stamps, told_kind(kind, before, after), lost, seed),
                        100.0),
         'suppressed': change.suppressed, 'invented': change.invented,
         'invented_elsewhere': sum(

@@ -75,6 +75,7 @@ class Defence:
         Return how far a declared loop is borne out: from 1 on it stands.
 
         Below, no loop is declared, and its probability is the threshold times the support.
-        Parameters are graphs as received; edges of the query must not be looked at.
+        Edges must not be looked at: those of the query are flipped without asking again, those of
+        the match, a keyframe, are what ``prepare`` has made of them.
         """
         return 1.0

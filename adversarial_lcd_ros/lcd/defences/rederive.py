@@ -26,15 +26,26 @@ class RederiveCheck(Defence):
 
     name: ClassVar[str] = 'rederive_check'
 
+    def __init__(self, config: LcdConfig) -> None:
+        super().__init__(config)
+        # Of the nodes that were seen last: an attack asks about the same ones again and again.
+        self._latest: tuple[bytes, int, int] | None = None
+        self._made: tuple[NDArray[np.uint32], NDArray[np.float32]]
+
     def unexplained(self, graph: MultiTierGraph) -> int:
         """Return how many edges are there and should not be, or should be and are not."""
-        edge = self._edges(graph).astype(np.int64)
+        edge = self._edges(graph)[0].astype(np.int64)
         key = edge[:, 0] * graph.node_count + edge[:, 1]
         return len(np.setxor1d(graph.edge_key, key, assume_unique=True))
 
-    def _edges(self, graph: MultiTierGraph) -> NDArray[np.uint32]:
-        return joined_pairs(graph.position, graph.size, graph.object_count,
-                            self.config.rederive_neighbours, graph.has_scene)
+    def _edges(self, graph: MultiTierGraph) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """Return the edges that the nodes explain, and their lengths."""
+        nodes = graph.node_digest, graph.width, graph.height
+        if self._latest != nodes:
+            edge = joined_pairs(graph.position, graph.size, graph.object_count,
+                                self.config.rederive_neighbours, graph.has_scene)
+            self._latest, self._made = nodes, (edge, graph.length_between(edge))
+        return self._made
 
 
 class Rederive(RederiveCheck):
@@ -43,16 +54,6 @@ class Rederive(RederiveCheck):
     name: ClassVar[str] = 'rederive'
     ignores_edges: ClassVar[bool] = True
 
-    def __init__(self, config: LcdConfig) -> None:
-        super().__init__(config)
-        # Of the nodes that were seen last: an attack asks about the same ones again and again.
-        self._latest: tuple[bytes, int, int] | None = None
-        self._made: tuple[NDArray[np.uint32], NDArray[np.float32]]
-
     def prepare(self, graph: MultiTierGraph) -> MultiTierGraph:
         """Return the graph with edges made from its nodes."""
-        nodes = graph.node_digest, graph.width, graph.height
-        if self._latest != nodes:
-            edge = self._edges(graph)
-            self._latest, self._made = nodes, (edge, graph.length_between(edge))
-        return graph.with_edges(*self._made)
+        return graph.with_edges(*self._edges(graph))

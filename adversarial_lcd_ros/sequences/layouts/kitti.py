@@ -79,7 +79,7 @@ def _poses(folder: Path, stamps: list[int]) -> Trajectory | None:
     if len(poses) != len(stamps):
         raise SequenceError(f'{path} has {len(poses)} poses for {len(stamps)} frames: expected '
                             'one for each')
-    return matrix_trajectory(stamps, poses)
+    return matrix_trajectory(stamps, poses, path)
 
 
 def _truth(folder: Path) -> Path:

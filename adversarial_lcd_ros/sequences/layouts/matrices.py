@@ -72,7 +72,7 @@ def _open_replica(folder: Path, options: Options) -> Sequence:
         if len(poses) != len(paths):
             raise SequenceError(f'{file} has {len(poses)} poses for {len(paths)} colour images: '
                                 'expected one for each')
-        return matrix_trajectory(stamps, poses)
+        return matrix_trajectory(stamps, poses, file)
 
     return file_sequence(folder, paths, stamps, options.trajectory(stamps, own), notes=notes,
                          focal_length_px=_replica_focal_length(folder))
@@ -84,12 +84,10 @@ def _open_scannet(folder: Path, options: Options) -> Sequence:
 
     def own() -> Trajectory:
         matrices = np.array([_pose(folder, path.stem) for path in paths]).reshape(-1, 4, 4)
-        # Where tracking was lost a pose is infinite; labels find no pose there.
-        known = np.isfinite(matrices).all(axis=(1, 2))
-        if not known.any():
+        if not np.isfinite(matrices).all(axis=(1, 2)).any():
             raise SequenceError(f'{folder}: no image has a pose of its name (pose/0.txt of '
                                 'color/0.jpg): expected 4 x 4 numbers, or --ground-truth none')
-        return matrix_trajectory(stamps[known], matrices[known])
+        return matrix_trajectory(stamps, matrices, folder)
 
     return file_sequence(folder, paths, stamps, options.trajectory(stamps, own), notes=notes,
                          focal_length_px=_scannet_focal_length(folder))
