@@ -5,6 +5,7 @@
 # make test, make lint, make bench, make clean
 # make soak: an hour of faults (ARGS='--only messages'); docs/reliability.md tells what came of it
 # make lock, make licences: renew requirements/ and docs/licences.md
+# make help: these lines
 #
 # The first target sets up .venv (releases and digests: requirements/; 1.6 GB on disk); after
 # that nothing is downloaded or built.
@@ -32,12 +33,15 @@ LOCKED := $(PIP) install --no-deps --require-hashes --no-build-isolation -r
 # Inherited from a Python with PyPI's ROS wheels, this would keep ours from finding their own.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo paper rings target test lint bench soak lock licences clean setup model
+.PHONY: help demo paper rings target test lint bench soak lock licences clean setup model
 .DEFAULT_GOAL := demo
 
 # $(call there,TARGET,VARIABLE): whether the sequences that a variable names lie in DATA.
 there = for sequence in $($(2)); do test -e "$(DATA)/$${sequence%@*}" || { echo "error: there is \
   no $(DATA)/$${sequence%@*}; make $(1) DATA=FOLDER, or $(2)='NAME ...' for others" >&2; exit 1; }; done
+
+help:
+	@sed -n '/^#/!q;s/^# \{0,1\}//p' $(firstword $(MAKEFILE_LIST))
 
 demo: model
 	$(BIN)/adversarial-lcd demo $(ARGS)

@@ -129,7 +129,7 @@ def test_wrong_command_line_is_a_usage_error(arguments, capsys):
 def test_known_error_is_one_line_and_exit_code_2(tmp_path, capsys):
     assert main(['inspect', str(tmp_path / 'gone')]) == 2
     captured = capsys.readouterr()
-    assert captured.err == f'error: there is no bag {tmp_path / "gone"}\n'
+    assert captured.err == f'error: there is no file or folder {tmp_path / "gone"}\n'
     assert captured.out == ''
 
 
@@ -190,6 +190,12 @@ def test_inspect_says_what_a_file_is_not(tmp_path, capsys):
     assert 'is neither a bag nor a payload of MultiTierGraph' in capsys.readouterr().err
 
 
+def test_a_folder_compared_with_itself_is_warned_of(tmp_path, capsys):
+    (tmp_path / 'latest').symlink_to(tmp_path / 'one')
+    assert main(['compare', str(tmp_path / 'one'), str(tmp_path / 'latest')]) == 2
+    assert 'warning: all 2 are the same results folder' in capsys.readouterr().err
+
+
 def test_import_reports_what_it_wrote(tmp_path, capsys):
     cv2 = pytest.importorskip('cv2')
     source = tmp_path / 'frames'
@@ -198,7 +204,9 @@ def test_import_reports_what_it_wrote(tmp_path, capsys):
         cv2.imwrite(str(source / f'{number}.png'), np.full((24, 32, 3), 60 * number, np.uint8))
     command = ['import', str(source), str(tmp_path / 'bag'), '--rate-hz', '10']
     assert main(command) == 0
-    assert '3 frames of 32 x 24 pixels, 0 poses, 0.2 s' in capsys.readouterr().out
+    captured = capsys.readouterr()
+    assert '3 frames of 32 x 24 pixels, 0 poses, 0.2 s' in captured.out
+    assert f'next: adversarial-lcd evaluate {tmp_path / "bag"}' in captured.err
     assert main(command) == 2
     assert 'exists already' in capsys.readouterr().err
     assert main([*command, '--overwrite']) == 0

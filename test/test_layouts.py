@@ -188,6 +188,14 @@ def test_video_with_a_pose_per_frame(tmp_path):
     assert import_sequence(path, tmp_path / 'bag', ground_truth=truth).poses == 4
 
 
+def test_poses_from_0_on_stamp_a_video_too(tmp_path):
+    """The first pose happens to be near the first frame; the others are as far apart as filmed."""
+    path, truth = layouts.video(tmp_path / 'walk.mp4'), tmp_path / 'truth.txt'
+    truth.write_text('\n'.join(make.pose_line(800_000_000 * frame) for frame in range(4)))
+    sequence = open_sequence(path, ground_truth=truth)
+    assert sequence.stamps_ns.tolist() == [0, 800_000_000, 1_600_000_000, 2_400_000_000]
+
+
 @pytest.mark.parametrize('content', [b'', b'<html>not found</html>', None])
 def test_what_is_no_video_is_refused(tmp_path, content, capfd):
     path = layouts.video(tmp_path / 'walk.mp4')

@@ -14,6 +14,7 @@ from adversarial_lcd_ros.commands.common import (
     add_source_options,
     progress_bar,
     source_options,
+    tell,
 )
 
 
@@ -44,3 +45,4 @@ def _import(options: Namespace) -> None:
     print(f'{printable(str(done.path))}: {done.frames} frames of {width} x {height} pixels, '
           f'{done.poses} poses, {done.duration_s:.1f} s, {done.size_bytes / 1e6:.1f} MB')
     print(done.coverage)
+    tell(f'next: adversarial-lcd {"labels" if done.poses else "evaluate"} {done.path}')

@@ -40,13 +40,16 @@ def add(commands: Commands) -> None:
 
 
 def _inspect(options: Namespace) -> None:
+    from adversarial_lcd_ros.errors import SequenceError
     from adversarial_lcd_ros.evaluation.kinds import is_results
     from adversarial_lcd_ros.sequences.bagfile import is_bag
 
     path, given = options.path, source_options(options)
+    if not path.exists():
+        raise SequenceError(f'there is no file or folder {path}')
     if is_results(path):
         _show_results(path, as_json=options.json)
-    elif is_bag(path) or not path.exists():
+    elif is_bag(path):
         _show_bag(path, given, as_json=options.json)
     elif path.is_file():
         _show_file(path, given, as_json=options.json)

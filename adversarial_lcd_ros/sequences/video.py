@@ -72,7 +72,7 @@ def video_sequence(path: Path, options: Options) -> Sequence:
 def _is_pose_per_frame(trajectory: Trajectory | None, stamps: NDArray[np.int64],
                        options: Options) -> bool:
     return (trajectory is not None and options.rate_hz is None
-            and len(trajectory) == len(stamps) and not trajectory.is_near(stamps).any())
+            and len(trajectory) == len(stamps) and not trajectory.is_near(stamps).all())
 
 
 def _scan(path: Path) -> tuple[NDArray[np.int64], tuple[int, int], tuple[str, ...]]:
