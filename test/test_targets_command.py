@@ -41,11 +41,15 @@ def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
     assert pairs['average_precision'] == pytest.approx(1)
     low, high = pairs['ci95']
     assert 0 <= low <= pairs['balanced_accuracy'] <= high <= 1
-    line = capsys.readouterr().out.splitlines()[2]
+    line = (tmp_path / 'out' / 'target.md').read_text().splitlines()[2]
     assert line.startswith('| walk, min_gap_s 0.1, map_window 0, detected_features 60, detector '
                            'none; labels by poses alone (rule distance, min_gap_s 0.1) | 20 |')
     # Few pairs, drawn twice, do not look like many.
     assert f'| 20 (10 loops), {pairs["distinct_pairs"]} different |' in line
+    printed = capsys.readouterr().out.splitlines()
+    assert [text.split()[:2] for text in printed if text.startswith(('edges', 'vbow'))] == [
+        ['edges', 'walk'], ['vbow', 'walk']] * 2
+    assert max(map(len, printed[:-1])) <= 80
 
 
 def test_each_target_gets_the_graphs_that_it_needs(tmp_path, command):
@@ -79,7 +83,8 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['geometric_check'] for row in rows] == [True, True]
     assert [row['recall'] for row in rows] == [0, 0]
-    assert '| walk, geometric check, ' in capsys.readouterr().out
+    assert '| walk, geometric check, ' in (tmp_path / 'out' / 'target.md').read_text()
+    assert 'edges, geometric check  walk' in capsys.readouterr().out
 
 
 def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
@@ -87,7 +92,8 @@ def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['defences'] for row in rows] == ['own_defences:IgnoresEdges'] * 2
     assert [row['recall'] for row in rows] == [0, 0]
-    assert '| walk, own_defences:IgnoresEdges, ' in capsys.readouterr().out
+    assert '| walk, own_defences:IgnoresEdges, ' in (tmp_path / 'out' / 'target.md').read_text()
+    assert 'edges, own_defences:IgnoresEdges  walk' in capsys.readouterr().out
 
 
 def test_defences_are_laid_beside_the_detector_without(tmp_path, command, capsys):
@@ -99,7 +105,8 @@ def test_defences_are_laid_beside_the_detector_without(tmp_path, command, capsys
     assert rows[0]['outcomes'] == rows[1]['outcomes']
     assert rows[0]['recall'] > 0 == rows[2]['recall']
     found = rows[0]['outcomes'].split(',').count('TP')
-    table = capsys.readouterr().out.split('| defence |')[1].splitlines()[2:5]
+    table = (tmp_path / 'out' / 'target.md').read_text().split('| defence |')[1].splitlines()[2:5]
+    assert 'edges, rederive_check' in capsys.readouterr().out
     cells = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     assert [line[2] for line in cells] == ['none', 'rederive_check', 'geometric_check']
     assert [line[5].split(' (')[0] for line in cells] == ['', '0.0', points(

@@ -18,6 +18,7 @@ from adversarial_lcd_ros.commands.common import (
     add_work_options,
     check_counts,
     print_json,
+    print_lines,
     progress_bar,
     tell,
 )
@@ -72,11 +73,7 @@ def _certify(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.certificates.page import write_page
     from adversarial_lcd_ros.evaluation.certificates.run import KIND, SCHEMA
     from adversarial_lcd_ros.evaluation.certificates.summaries import summarise
-    from adversarial_lcd_ros.evaluation.certificates.tables import (
-        accuracy_lines,
-        certified_lines,
-        markdown,
-    )
+    from adversarial_lcd_ros.evaluation.certificates.tables import terminal_lines
     from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
     from adversarial_lcd_ros.evaluation.store import open_store
 
@@ -95,8 +92,9 @@ def _certify(options: Namespace) -> None:
     if options.json:
         print_json({'folder': str(options.output), **summary})
         return
-    print(markdown(certified_lines(summary['rows'])), markdown(accuracy_lines(summary['rows'])),
-          page, sep='\n')
+    print_lines('Balanced accuracy that no so many flips can lower',
+                terminal_lines(summary['rows']))
+    print(f'frames, classes, intervals: {page}')
 
 
 def _run(options: Namespace, tasks: list[CertificateTask], store: CellStore) -> None:

@@ -20,6 +20,7 @@ from adversarial_lcd_ros.commands.common import (
     check_counts,
     imported_source,
     print_json,
+    print_lines,
     progress_bar,
     source_options,
     tell,
@@ -80,7 +81,11 @@ def add(commands: Commands) -> None:
 
 def _run(options: Namespace) -> None:
     from adversarial_lcd_ros.evaluation.detectors.run import KIND, ROW_COLUMNS, SCHEMA, run_target
-    from adversarial_lcd_ros.evaluation.detectors.tables import TABLES, target_tables
+    from adversarial_lcd_ros.evaluation.detectors.tables import (
+        TABLES,
+        target_lines,
+        target_tables,
+    )
     from adversarial_lcd_ros.evaluation.results import SUMMARY, ResultsFolder, summary_document
     from adversarial_lcd_ros.evaluation.store import open_store
     from adversarial_lcd_ros.evaluation.workers import local_workers
@@ -104,13 +109,13 @@ def _run(options: Namespace) -> None:
         rows = [store.rows[task.key] for task in tasks]
         summary = summary_document(KIND, SCHEMA, rows)
         results.write_json(SUMMARY, summary)
-    tables = target_tables(rows)
-    write_text(options.output / TABLES, tables)
+    write_text(options.output / TABLES, target_tables(rows))
     if options.json:
         print_json({'folder': str(options.output), **summary})
         return
-    print(tables, end='')
-    print(options.output / SUMMARY)
+    for title, lines in target_lines(rows):
+        print_lines(title, lines)
+    print(f'all figures: {options.output / TABLES}, {options.output / SUMMARY}')
 
 
 def _sequences(options: Namespace) -> list[TargetSequence]:

@@ -48,6 +48,20 @@ def accuracy_lines(rows: Sequence[Row]) -> Lines:
             for row in rows]
 
 
+def terminal_lines(rows: Sequence[Row]) -> Lines:
+    """
+    Return the certified balanced accuracy by flips, for a terminal of 80 columns.
+
+    Settings that all detectors share are left out.
+    """
+    changed = [row['changed'].split(', ') for row in rows]
+    common = set.intersection(*map(set, changed))
+    own = [', '.join(part for part in parts if part not in common) for parts in changed]
+    return [{'detector': name_of({**row, 'changed': text}), 'sequence': row['sequence'],
+             **{_flips(number): _share(row, number) for number in (0, *shown_flips(rows))}}
+            for row, text in zip(rows, own, strict=True)]
+
+
 def markdown(lines: Lines) -> str:
     """Return rows of heading to cell as a Markdown table."""
     return '\n'.join((*table_of(lines), ''))

@@ -1,19 +1,22 @@
 # Copyright 2026 adversarial_lcd_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The figures of the targets as tables in Markdown, for pages and for people."""
+"""The figures of the targets: tables in Markdown for pages, lines for a terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
+from adversarial_lcd_ros.evaluation import wording
 from adversarial_lcd_ros.evaluation.detectors.defended import defended_table, settings_of
 from adversarial_lcd_ros.evaluation.markdown import table, table_line
 from adversarial_lcd_ros.evaluation.store import Row
 from adversarial_lcd_ros.registry import NONE, TARGETS
 
 TABLES = 'target.md'
+_TITLES = {'pairs': 'Balanced accuracy on pairs', 'live': 'Balanced accuracy live'}
+_SHOWN = {'pairs': ('average_precision', 'mcc'), 'live': ('precision', 'recall')}
 _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average precision',
                     'recall at 100 % precision', 'MCC'),
           'live': ('loops / new places', 'balanced accuracy', '95 % interval', 'precision',
@@ -25,18 +28,11 @@ _HEADS = {'pairs': ('pairs', 'balanced accuracy', '95 % interval', 'average prec
 def target_tables(rows: Iterable[Row]) -> str:
     """Return a table for each protocol, in the order of sequences, sizes and targets."""
     rows = list(rows)
-    order = {name: place for place, name in enumerate(TARGETS)}
-    own = len(order)
     parts = []
     for protocol, head in _HEADS.items():
-        chosen = [row for row in rows if row['protocol'] == protocol]
+        chosen = _ordered(rows, protocol)
         if not chosen:
             continue
-        names = list(dict.fromkeys(row['sequence'] for row in chosen))
-        settings = list(dict.fromkeys(map(settings_of, chosen)))
-        chosen.sort(key=lambda row: (names.index(row['sequence']), row['nodes'],
-                                     settings.index(settings_of(row)),
-                                     order.get(row['target'], own), row['target']))
         lines = table(('sequence', 'n', 'target', *head), ())
         for _, group in groupby(chosen, key=lambda row: (row['sequence'], row['nodes'],
                                                          settings_of(row))):
@@ -44,6 +40,47 @@ def target_tables(rows: Iterable[Row]) -> str:
         parts.append('\n'.join(lines))
     parts += defended_table(rows)
     return '\n\n'.join(parts) + '\n'
+
+
+def target_lines(rows: Iterable[Row]) -> list[tuple[str, list[dict[str, str]]]]:
+    """
+    Return a title and a row a detector for each protocol, for a terminal of 80 columns.
+
+    Settings that all detectors share, and the size of graphs that all share, are left out.
+    """
+    rows = list(rows)
+    common = set.intersection(*({*settings_of(row)[2].split(', ')} for row in rows))
+    sizes = len({row['nodes'] for row in rows})
+    tables = [(title, [_line(row, common, sizes > 1) for row in _ordered(rows, protocol)])
+              for protocol, title in _TITLES.items()]
+    return [(title, lines) for title, lines in tables if lines]
+
+
+def _line(row: Row, common: set[str], sized: bool) -> dict[str, str]:
+    defences, check, changed = settings_of(row)
+    detector = [row['target'], *([defences] if defences != NONE else []),
+                *(['geometric check'] if check else []),
+                *(part for part in changed.split(', ') if part not in common)]
+    size = f', n {row["nodes_mean"]:.0f}' if sized else ''
+    bounds = f' ({wording.interval(row["ci95"], 100.0)})' if row['ci95'] else ''
+    return {'detector': ', '.join(detector), 'sequence': row['sequence'] + size,
+            'accuracy, % (95 %)': wording.points(_percent(row['balanced_accuracy'])) + bounds,
+            **{name.replace('_', ' '): _share(row[name]) for name in _SHOWN[row['protocol']]}}
+
+
+def _percent(value: float | None) -> float | None:
+    return None if value is None else 100 * value
+
+
+def _ordered(rows: Iterable[Row], protocol: str) -> list[Row]:
+    """Return the rows of a protocol in the order of sequences, sizes, settings and targets."""
+    chosen = [row for row in rows if row['protocol'] == protocol]
+    order = {name: place for place, name in enumerate(TARGETS)}
+    names = list(dict.fromkeys(row['sequence'] for row in chosen))
+    settings = list(dict.fromkeys(map(settings_of, chosen)))
+    return sorted(chosen, key=lambda row: (
+        names.index(row['sequence']), row['nodes'], settings.index(settings_of(row)),
+        order.get(row['target'], len(order)), row['target']))
 
 
 def _group_lines(group: Sequence[Row]) -> list[str]:
