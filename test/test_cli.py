@@ -190,12 +190,6 @@ def test_inspect_says_what_a_file_is_not(tmp_path, capsys):
     assert 'is neither a bag nor a payload of MultiTierGraph' in capsys.readouterr().err
 
 
-def test_a_folder_compared_with_itself_is_warned_of(tmp_path, capsys):
-    (tmp_path / 'latest').symlink_to(tmp_path / 'one')
-    assert main(['compare', str(tmp_path / 'one'), str(tmp_path / 'latest')]) == 2
-    assert 'warning: all 2 are the same results folder' in capsys.readouterr().err
-
-
 def test_import_reports_what_it_wrote(tmp_path, capsys):
     cv2 = pytest.importorskip('cv2')
     source = tmp_path / 'frames'

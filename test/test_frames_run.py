@@ -30,6 +30,7 @@ from adversarial_lcd_ros.evaluation.paper.summaries import summarise_cells
 from adversarial_lcd_ros.evaluation.store import open_store
 from adversarial_lcd_ros.evaluation.streams import load_stream_graphs, open_streams
 from adversarial_lcd_ros.evaluation.workers import dask_workers, local_workers
+from adversarial_lcd_ros.graph_sequences.bags import build_graph_bag
 
 TIMES = ('query_s', 'search_s', 'judge_s', 'duration_s')
 
@@ -68,6 +69,14 @@ def test_cells_meet_graphs_that_their_targets_can_judge(tmp_path, vocabulary, ce
             for task in tasks] == [('tiers', ['wl']), ('anchors', ['symbio'])]
     assert [graph.has_scene for task in tasks
             for graph in load_stream_graphs(task.graphs)[:1]] == [False, True]
+
+
+def test_graphs_without_a_scene_are_refused_before_the_work(tmp_path, vocabulary):
+    config = builder_config(vocabulary)
+    built = build_graph_bag(str(walk_folder(tmp_path / 'walk')), tmp_path / 'graphs', config)
+    with pytest.raises(EvaluationError, match='without a node for the scene'):
+        open_streams([str(built.path)], [NODES], config, LABELS, tmp_path / 'cache', nothing,
+                     variant='anchors')
 
 
 def untimed(rows):

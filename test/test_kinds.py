@@ -186,11 +186,19 @@ def test_different_kinds_are_refused_in_one_line(tmp_path, capsys):
 
 @pytest.mark.parametrize(('options', 'said'), [
     (['a'], '1 results folder: expected two'), (['a', 'a', '--picture', 'x.bmp'], 'in .svg'),
-    (['a', 'nowhere'], 'nowhere has no summary.json')])
+    (['a', 'nowhere'], 'there is no folder nowhere')])
 def test_a_wrong_comparison_is_refused(tmp_path, capsys, options, said):
     replay(tmp_path / 'a')
     assert main(['compare', *options]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_folder_compared_with_itself_is_warned_of(tmp_path, capsys):
+    folder = MAKERS['replay'](tmp_path / 'one')
+    (tmp_path / 'latest').symlink_to(folder)
+    assert main(['compare', str(folder), str(tmp_path / 'latest'), '--picture',
+                 str(tmp_path / 'c.svg')]) == 0
+    assert 'warning: all 2 are the same results folder' in capsys.readouterr().err
 
 
 @every_kind

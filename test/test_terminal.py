@@ -112,8 +112,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.mark.parametrize(('redirection', 'said', 'code'), [
-    ('>&-', 'error: there is no bag nowhere', 2), ('2>&-', '', 2), ('>&- 2>&- <&-', '', 2),
-    ('2>/dev/full', '', 2)])
+    ('>&-', 'error: there is no file or folder nowhere', 2), ('2>&-', '', 2),
+    ('>&- 2>&- <&-', '', 2), ('2>/dev/full', '', 2)])
 def test_a_stream_that_is_closed_or_full_changes_no_exit_code(tmp_path, redirection, said, code):
     """The number of a closed stream would be that of the next file, which gets what is said."""
     done = subprocess.run(

@@ -51,10 +51,10 @@ def compare_folders(folders: Sequence[Path], path: Path = PICTURE, *,
 
     if path.suffix != '.svg':
         raise ConfigError(f'--picture {path}: expected a name that ends in .svg')
+    comparison = compare(folders)
     if len(folders) > 1 and len({folder.resolve() for folder in folders}) == 1:
         tell(f'warning: all {len(folders)} are the same results folder; "evaluate --output" '
              'makes another one to compare it with')
-    comparison = compare(folders)
     for warning in comparison.warnings:
         tell(f'warning: {warning}')
     picture = _write_picture(comparison, path)

@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 import hashlib
 from pathlib import Path
 
-from adversarial_lcd_ros.config import BuilderConfig, LabelConfig
+from adversarial_lcd_ros.config import ANCHORS, BuilderConfig, LabelConfig
 from adversarial_lcd_ros.errors import EvaluationError
 from adversarial_lcd_ros.files.digests import digest_of
 from adversarial_lcd_ros.graph import MultiTierGraph
@@ -128,6 +128,11 @@ def open_streams(sources: Sequence[str], nodes: Iterable[int], builder: BuilderC
             if sequence.name in taken:
                 raise EvaluationError(f'two sequences are called {sequence.name}: rename one of '
                                       'the folders, or leave one out')
+            if variant == ANCHORS and not all(graph.has_scene for graph in sequence.graphs):
+                raise EvaluationError(
+                    f'{source} has graphs without a node for the scene, and a target needs it: '
+                    f'"adversarial-lcd build --graph-variant {ANCHORS}" makes such graphs, or '
+                    'leave that target out')
             # Stamps are the same in graphs of any size.
             labels = labels or label_sequence(
                 sequence, (own_labels or {}).get(sequence.name, config))

@@ -51,6 +51,8 @@ def open_results(folder: Path) -> tuple[ResultsKind, Results]:
         damaged.
 
     """
+    if not folder.is_dir():
+        raise EvaluationError(f'there is no folder {folder}: expected a finished results folder')
     if not is_results(folder):
         raise EvaluationError(f'{folder} has no {SUMMARY}: expected a finished results folder of '
                               f'one of the kinds {", ".join(KINDS)}')
