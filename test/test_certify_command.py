@@ -18,7 +18,8 @@ def command(tmp_path, vocabulary, monkeypatch):
                              **{'builder-features': 20})
 
 
-def test_a_row_for_each_detector_with_a_share_that_falls(tmp_path, command, capsys):
+def test_a_row_for_each_detector_with_a_share_that_falls(tmp_path, command, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '80')
     assert command('--targets', 'edges', 'vbow', '--defences', 'none', 'rederive') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [(row['target'], row['defences']) for row in rows] == [

@@ -27,7 +27,8 @@ def command(tmp_path, vocabulary, monkeypatch):
                              draws=2)
 
 
-def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys):
+def test_every_target_gets_a_row_for_each_protocol(tmp_path, command, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '80')
     assert command('--targets', 'edges', 'vbow') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [(row['protocol'], row['target']) for row in rows] == [
@@ -76,7 +77,8 @@ def test_rows_of_other_labels_are_not_taken_for_these(command, capsys, protocol)
         assert '1 of 1 rows to make' in capsys.readouterr().err
 
 
-def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
+def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '120')
     # More matches are asked for than there are features: nothing passes.
     assert command('--targets', 'edges', '--lcd-geometric-check',
                    '--lcd-geometric-inliers', '21') == 0
@@ -87,7 +89,8 @@ def test_a_row_behind_the_geometric_check_says_so(tmp_path, command, capsys):
     assert 'edges, geometric check  walk' in capsys.readouterr().out
 
 
-def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
+def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '120')
     assert command('--targets', 'edges', '--lcd-defences', 'own_defences:IgnoresEdges') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
     assert [row['defences'] for row in rows] == ['own_defences:IgnoresEdges'] * 2
@@ -96,7 +99,8 @@ def test_pairs_and_live_are_judged_behind_a_defence(tmp_path, command, capsys):
     assert 'edges, own_defences:IgnoresEdges  walk' in capsys.readouterr().out
 
 
-def test_defences_are_laid_beside_the_detector_without(tmp_path, command, capsys):
+def test_defences_are_laid_beside_the_detector_without(tmp_path, command, capsys, monkeypatch):
+    monkeypatch.setenv('COLUMNS', '120')
     assert command('--targets', 'edges', '--protocols', 'live', '--lcd-geometric-inliers', '21',
                    '--defences', 'none', 'rederive_check', 'geometric_check') == 0
     rows = json.loads((tmp_path / 'out' / 'summary.json').read_text())['rows']
