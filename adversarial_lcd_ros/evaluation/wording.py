@@ -90,3 +90,10 @@ def detector_title(detector: Mapping[str, Any] | None) -> str:
 def sentence(text: str) -> str:
     """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
+
+
+def own_settings(changed: Sequence[str]) -> list[str]:
+    """Return settings, each a text "name value, ...", without those that all of them share."""
+    parts = [text.split(', ') for text in changed]
+    common = set.intersection(*map(set, parts))
+    return [', '.join(part for part in own if part not in common) for own in parts]

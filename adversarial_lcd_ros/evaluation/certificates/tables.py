@@ -54,9 +54,7 @@ def terminal_lines(rows: Sequence[Row]) -> Lines:
 
     Settings that all detectors share are left out.
     """
-    changed = [row['changed'].split(', ') for row in rows]
-    common = set.intersection(*map(set, changed))
-    own = [', '.join(part for part in parts if part not in common) for parts in changed]
+    own = wording.own_settings([row['changed'] for row in rows])
     return [{'detector': name_of({**row, 'changed': text}), 'sequence': row['sequence'],
              **{_flips(number): _share(row, number) for number in (0, *shown_flips(rows))}}
             for row, text in zip(rows, own, strict=True)]

@@ -49,18 +49,20 @@ def target_lines(rows: Iterable[Row]) -> list[tuple[str, list[dict[str, str]]]]:
     Settings that all detectors share, and the size of graphs that all share, are left out.
     """
     rows = list(rows)
-    common = set.intersection(*({*settings_of(row)[2].split(', ')} for row in rows))
+    changed = [settings_of(row)[2] for row in rows]
+    own = dict(zip(changed, wording.own_settings(changed), strict=True))
     sizes = len({row['nodes'] for row in rows})
-    tables = [(title, [_line(row, common, sizes > 1) for row in _ordered(rows, protocol)])
+    tables = [(title, [_line(row, own[settings_of(row)[2]], sizes > 1)
+                       for row in _ordered(rows, protocol)])
               for protocol, title in _TITLES.items()]
     return [(title, lines) for title, lines in tables if lines]
 
 
-def _line(row: Row, common: set[str], sized: bool) -> dict[str, str]:
-    defences, check, changed = settings_of(row)
+def _line(row: Row, own: str, sized: bool) -> dict[str, str]:
+    defences, check, _ = settings_of(row)
     detector = [row['target'], *([defences] if defences != NONE else []),
                 *(['geometric check'] if check else []),
-                *(part for part in changed.split(', ') if part not in common)]
+                *([own] if own else [])]
     size = f', n {row["nodes_mean"]:.0f}' if sized else ''
     bounds = f' ({wording.interval(row["ci95"], 100.0)})' if row['ci95'] else ''
     return {'detector': ', '.join(detector), 'sequence': row['sequence'] + size,
